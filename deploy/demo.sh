@@ -16,6 +16,7 @@ cd "$(dirname "$0")/.."
 
 export TISSUEFORM_BUILD_DIR=${TISSUEFORM_BUILD_DIR:-$PWD/build/release}
 
+echo "demo.sh: step 1 of 3, packages: about 3 minutes on a fresh machine, else nothing to do"
 deploy/install_packages.sh build
 targets=(tissueform tissueform-online tissueform-server)
 for option in "$@"; do
@@ -24,5 +25,7 @@ for option in "$@"; do
     deploy/build_web.sh
   fi
 done
+echo "demo.sh: step 2 of 3, build: about 5 minutes on two cores the first time"
 deploy/build.sh programs "${targets[@]}"
+echo "demo.sh: step 3 of 3, demo: about 10 seconds"
 exec "$TISSUEFORM_BUILD_DIR/bin/tissueform" demo "$@"

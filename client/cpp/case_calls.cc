@@ -158,11 +158,11 @@ absl::StatusOr<std::string> CaseCalls::Read(const std::string& name) {
     if (!IsTransient(ended) || bytes.size() == before) return ended;
   }
   if (!follows) {
-    return absl::DataLossError("the server's chunks do not follow each other; read the case again");
+    return absl::DataLossError("the server's chunks are not contiguous; read the case again");
   }
   if (Sha256Hex({bytes}) == sha256) return bytes;
   return absl::DataLossError(
-      "the bytes that the server sent are not those of the case; read it "
+      "the server's bytes do not match the case; read it "
       "again");
 }
 

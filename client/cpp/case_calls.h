@@ -22,7 +22,7 @@ namespace tissueform {
 
 // The cases of a server: the rpcs of CaseService. Got from TissueformClient, whose contract it
 // shares: calls block, each with a deadline, and errors carry the server's code, message and
-// reason. A case is bytes here, which nobody looks into.
+// reason. A case is uninterpreted bytes here.
 //
 // Thread-safe.
 class CaseCalls {
@@ -30,8 +30,8 @@ class CaseCalls {
   CaseCalls(const std::shared_ptr<grpc::Channel>& channel, std::chrono::milliseconds call_deadline,
             SessionRoutes* routes);
 
-  // Sends the case unless the server has it. What breaks off begins anew (on_resumed is not
-  // called), also when the server is started again, until options.give_up_after has passed.
+  // Sends the case unless the server has it. An interrupted upload starts again (on_resumed is not
+  // called), also after a restart of the server, until options.give_up_after has passed.
   absl::StatusOr<v1::Case> Upload(absl::string_view bytes, const std::string& title,
                                   const UploadOptions& options = {});
   absl::StatusOr<v1::Case> Get(const std::string& name);

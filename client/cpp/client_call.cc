@@ -48,7 +48,7 @@ absl::Status EndOfCall(const grpc::Status& status, bool was_cancelled) {
 }
 
 absl::Status AnswerWasLost() {
-  return absl::UnavailableError("the server's answer was lost on the way");
+  return absl::UnavailableError("the server's answer was lost in transit");
 }
 
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context) {

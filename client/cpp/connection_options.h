@@ -16,9 +16,9 @@ struct ConnectionOptions {
   // One's own certificate and its key, for servers that ask for one.
   std::string tls_certificate = {};
   std::string tls_key = {};
-  // The token that says who one is; read again when it is renewed. Only its owner may read it.
+  // File with the caller's token; reloaded when renewed. Only its owner may read it.
   std::string token_file = {};
-  bool insecure = false;  // a server off this machine without encryption all the same
+  bool insecure = false;  // allow an unencrypted connection to another machine
 
   bool encrypted() const { return tls || !tls_ca.empty() || !tls_certificate.empty(); }
 };

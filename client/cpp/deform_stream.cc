@@ -43,7 +43,7 @@ absl::Status DeformStream::Start(v1::DeformService::Stub* stub, const Options& o
   }
   if (!response.has_started()) {
     return absl::InternalError(
-        "the stream did not begin with `started`; the server speaks another version");
+        "the stream did not start with `started`; the server has another version");
   }
   started_ = std::move(*response.mutable_started());
   node_ = NodeOf(context_);

@@ -30,7 +30,7 @@ class ChunkReader {
 
  private:
   static absl::Status Incomplete() {
-    return absl::DataLossError("the server's chunks do not follow each other; read them again");
+    return absl::DataLossError("the server's chunks are not contiguous; read them again");
   }
 
   std::string bytes_;

@@ -58,7 +58,7 @@ class Call {
     TF_RETURN_IF_ERROR(EndOfCall(status, was_cancelled_));
     if (session.has_value()) return *std::move(session);
     return absl::InternalError(
-        "the preparation ended without a session; the server speaks another version");
+        "the preparation ended without a session; the server has another version");
   }
 
  private:
@@ -109,7 +109,7 @@ std::string StageText(v1::PreparationStage stage) {
     case v1::PREPARATION_STAGE_RESPONSES:
       return "preparing the model";
     case v1::PREPARATION_STAGE_KEEPING:
-      return "keeping the session";
+      return "storing the session";
     case v1::PREPARATION_STAGE_ANSWERS:
       return "preparing answers";
     default:

@@ -37,11 +37,11 @@ absl::Status TakeMessage(const v1::GetPreparedAnswersResponse& message, FetchedA
     return absl::OkStatus();
   }
   if (message.chunk().offset() != static_cast<int64_t>(fetched->bytes.size())) {
-    return Damaged("came in chunks that do not follow each other");
+    return Damaged("have chunks that are not contiguous");
   }
   fetched->bytes += message.chunk().data();
   if (static_cast<int64_t>(fetched->bytes.size()) > fetched->header.total_bytes()) {
-    return Damaged("are longer than was told");
+    return Damaged("are longer than announced");
   }
   return absl::OkStatus();
 }
@@ -65,7 +65,7 @@ absl::StatusOr<FetchedAnswers> FetchBytes(v1::DeformService::Stub* stub,
       RunSessionCall(routes, request.session(), CallRepeat::kAlways, deadline, fetch));
   TF_RETURN_IF_ERROR(taken);
   if (Sha256Hex({fetched.bytes}) != fetched.header.sha256()) {
-    return Damaged("are cut off, or have another SHA-256 than was told");
+    return Damaged("are incomplete, or do not match the announced SHA-256");
   }
   return fetched;
 }
@@ -80,7 +80,7 @@ absl::StatusOr<std::unique_ptr<PreparedEvaluator>> PreparedEvaluator::Fetch(
   AnswerReading reading = ReadAnswers(fetched.bytes);
   if (reading.error != AnswerError::kNone) return absl::DataLossError(reading.message);
   if (reading.answers.numbers.num_handles != static_cast<double>(handles.size())) {
-    return Damaged("are of a session with other handles");
+    return Damaged("belong to a session with other handles");
   }
   return std::unique_ptr<PreparedEvaluator>(new PreparedEvaluator(
       std::move(fetched.header), std::move(handles), std::move(reading.answers)));

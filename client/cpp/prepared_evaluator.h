@@ -38,8 +38,8 @@ class PreparedEvaluator {
   // Asks for what a stream with the same vertices, model and `prepared` answers from. `handles`:
   // the names of the session's, in its order (v1::Session::handles).
   //
-  // Errors: the server's; DataLoss (bytes that do not follow each other, are not those whose
-  // SHA-256 was told, or cannot be evaluated with these handles).
+  // Errors: the server's; DataLoss (bytes that are not contiguous, do not match the announced
+  // SHA-256, or cannot be evaluated with these handles).
   static absl::StatusOr<std::unique_ptr<PreparedEvaluator>> Fetch(
       v1::DeformService::Stub* stub, const v1::GetPreparedAnswersRequest& request,
       std::vector<std::string> handles, SessionRoutes* routes,

@@ -18,8 +18,8 @@
 namespace tissueform {
 
 // A watch that outlives its connection and the server that held its session: where it breaks
-// another one of the same session begins. Frames are then numbered anew; what was received last
-// stays good until the next comes, and where that falls_back for some seconds more.
+// another one of the same session begins. Frames are then numbered from the start; the last
+// received frame stays good until the next comes, and where that falls_back for some seconds more.
 //
 // One thread receives and acknowledges; Cancel may be called from others. It comes back within
 // Receive. The client must outlive it.
@@ -47,8 +47,8 @@ class ReattachingWatch {
   // does not know it. Of the receiving thread.
   bool falls_back() const { return falls_back_; }
 
-  // The frame that was received last, and all before it, were used. Where that cannot be said the
-  // watch begins anew: the server would soon send nothing more.
+  // The frame that was received last, and all before it, were used. If the acknowledgement fails,
+  // the watch starts again, because the server would soon stop sending.
   void Ack(const v1::WatchFrame& frame);
 
   // Ends the watch at once. Any thread, any time.
@@ -84,7 +84,7 @@ class ReattachingWatch {
   v1::WatchForm form_;
   absl::Status end_;
   bool saw_drag_ = false;     // in the last frame that did not fall back
-  bool awaits_drag_ = false;  // since the watch began anew
+  bool awaits_drag_ = false;  // since the watch started again
   bool falls_back_ = false;
 
   mutable Mutex mutex_;

@@ -39,7 +39,7 @@ absl::Status Reattachment::After(absl::Status why, const std::function<absl::Sta
     const std::chrono::milliseconds wait =
         std::exchange(at_once, false) ? std::chrono::milliseconds(0) : backoff_.After(why);
     if (std::chrono::steady_clock::now() + wait > give_up) return why;
-    if (!Wait(wait)) return absl::CancelledError("the stream was cancelled");
+    if (!Wait(wait)) return absl::CancelledError("the stream was canceled");
     why = open();
     if (why.ok()) {
       ++count_;

@@ -46,9 +46,9 @@ class Reattachment {
   int count() const { return count_; }
 
  private:
-  // The stream that was there has ended: waits begin anew where it has lasted.
+  // The previous stream has ended: resets the waits if it lasted long enough.
   void JudgeLastStream();
-  // False when it was cancelled meanwhile.
+  // False when canceled during the wait.
   bool Wait(std::chrono::milliseconds time) ABSL_LOCKS_EXCLUDED(mutex_);
 
   const Options options_;

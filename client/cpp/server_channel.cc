@@ -68,7 +68,7 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> CredentialsOf(
     const ConnectionOptions& options) {
   if (!options.encrypted()) return grpc::InsecureChannelCredentials();
   if (options.tls_certificate.empty() != options.tls_key.empty()) {
-    return absl::InvalidArgumentError("a client's certificate needs its key, and a key it");
+    return absl::InvalidArgumentError("give both certificate and key");
   }
   grpc::SslCredentialsOptions tls;
   if (!options.tls_ca.empty()) {
@@ -111,7 +111,7 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeServerChannel(
       return absl::FailedPreconditionError(
           absl::StrCat(address,
                        " is another machine; give --tls or --tls-ca FILE, or --insecure "
-                       "if its network is yours alone"));
+                       "if its network is isolated"));
     }
   }
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ChannelCredentials> credentials,

@@ -16,8 +16,8 @@
 
 namespace tissueform {
 
-// Whether an address ("HOST:PORT", "unix:PATH") is this machine's own by what it says: nobody is
-// asked for the name.
+// Whether an address ("HOST:PORT", "unix:PATH") is this machine's own by its text; the name is
+// not resolved.
 bool IsLocalAddress(absl::string_view address);
 
 // What gRPC is given to reach `address`. Sends nothing.

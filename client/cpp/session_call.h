@@ -57,7 +57,7 @@ class SessionAttempts {
   void AddHeaders(grpc::ClientContext* context) const;
   // The last attempt began well: remembers who answered.
   void Succeeded(const grpc::ClientContext& context) const;
-  // How long to wait before the next attempt; none: there is none, and the error stands.
+  // How long to wait before the next attempt; nullopt: no further attempt, return the error.
   std::optional<std::chrono::milliseconds> AfterError(const absl::Status& error);
 
  private:

@@ -30,7 +30,7 @@ class SessionRoutes {
 
   // Empty: not known.
   std::string NodeOf(const std::string& session);
-  // Nothing happens with a name that is none (a header would not take it), nor without a session.
+  // Ignores a name that is not a valid header value, and an empty session.
   void Remember(const std::string& session, const std::string& node);
   void Forget(const std::string& session);
   // What an error says of it: with SESSION_MOVED and MEMORY_BUDGET_FULL where to go, if that is

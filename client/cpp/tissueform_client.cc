@@ -59,7 +59,7 @@ absl::StatusOr<std::unique_ptr<TissueformClient>> TissueformClient::Connect(
         std::chrono::duration<double>(options.connect_deadline).count(),
         " s; start one (tissueform-server --port PORT) or check address and firewall: `tissueform "
         "doctor ",
-        address, "` tells what is wrong"));
+        address, "` finds the cause"));
   }
   return std::unique_ptr<TissueformClient>(new TissueformClient(channel, token, options));
 }

@@ -65,7 +65,7 @@ class TissueformClient {
 
   // `address` is HOST:PORT. Connects directly: proxies of the environment are not used.
   //
-  // Errors: InvalidArgument (no port), Unavailable when nobody answers within the deadline; those
+  // Errors: InvalidArgument (no port), Unavailable (no answer within the deadline); those
   // of MakeServerChannel and OpenTokenOf.
   static absl::StatusOr<std::unique_ptr<TissueformClient>> Connect(const std::string& address,
                                                                    const Options& options);
@@ -95,7 +95,8 @@ class TissueformClient {
   absl::StatusOr<v1::Session> GetSession(const std::string& name);
   // All of them, page after page.
   absl::StatusOr<std::vector<v1::Session>> ListSessions();
-  // Prepared anew when it returns. Errors: Aborted also when request.etag is not the session's.
+  // The session is prepared again when this returns. Errors: Aborted also when request.etag is not
+  // the session's.
   absl::StatusOr<v1::Session> UpdateSession(const v1::UpdateSessionRequest& request);
   // CreateSession, UpdateSession, or a session that is to be in memory, with word of how far it is,
   // and cancelled at once. Errors: theirs; Cancelled.

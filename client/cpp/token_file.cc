@@ -35,7 +35,7 @@ absl::Status CheckOwnerOnly(const std::filesystem::path& path) {
     return absl::OkStatus();
   }
   return absl::FailedPreconditionError(
-      absl::StrCat(path.string(), ": others may open the token; chmod 600"));
+      absl::StrCat(path.string(), ": other users can read the token; chmod 600"));
 }
 
 }  // namespace
@@ -64,7 +64,7 @@ absl::StatusOr<std::string> TokenFile::Read() const {
   if (token.empty() || text.size() > kMaxTokenFileBytes ||
       !std::all_of(token.begin(), token.end(), IsTokenLetter)) {
     return absl::InvalidArgumentError(absl::StrCat(
-        path_.string(), ": holds no token; it is one word of letters, digits and -._~+/="));
+        path_.string(), ": has no token; it is one word of letters, digits and -._~+/="));
   }
   return std::string(token);
 }

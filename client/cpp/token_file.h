@@ -27,7 +27,7 @@ class TokenFile {
   // nothing of the token.
   static absl::StatusOr<std::shared_ptr<TokenFile>> Open(const std::string& path);
 
-  // As it stands in the file; the one before while what stands there is none.
+  // The token in the file; the previous one while the file is invalid.
   std::string Current();
 
  private:

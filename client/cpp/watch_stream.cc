@@ -32,7 +32,7 @@ absl::Status WatchStream::Start() {
   if (!call_->Read(&response)) return Finish();
   if (!response.has_started()) {
     return absl::InternalError(
-        "the watch did not begin with `started`; the server speaks another version");
+        "the watch did not start with `started`; the server has another version");
   }
   name_ = response.started().watch();
   node_ = NodeOf(context_);

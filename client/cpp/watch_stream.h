@@ -23,7 +23,7 @@ namespace tissueform {
 //
 // One thread receives; Ack and Cancel may be called from others. Frames must be acknowledged, or
 // the server sends no more after max_unacked of them; a slow receiver skips frames and slows
-// nobody.
+// no other client.
 class WatchStream {
  public:
   struct Options {

@@ -88,7 +88,7 @@ absl::StatusOr<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text
     }
   }
   return absl::InvalidArgumentError(
-      "grpc-timeout: at most eight digits and one of H, M, S, m, u and n are needed");
+      "grpc-timeout must be at most eight digits and one of H, M, S, m, u and n");
 }
 
 std::map<std::string, std::string> AllowedMetadata(

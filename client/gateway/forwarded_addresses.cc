@@ -18,9 +18,8 @@ ForwardedAddresses::ForwardedAddresses(const std::vector<std::string>& proxies) 
 absl::Status ForwardedAddresses::CheckProxies(const std::vector<std::string>& proxies) {
   for (const std::string& proxy : proxies) {
     if (AddressOr(proxy).empty()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("--trust-forwarded-from ", proxy,
-                       ": is no address; give one as 192.0.2.1 or 2001:db8::1"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--trust-forwarded-from ", proxy, ": not an address; write 192.0.2.1 or 2001:db8::1"));
     }
   }
   return absl::OkStatus();

@@ -35,9 +35,9 @@ absl::Status CheckServers(const GatewayOptions& options) {
     if (absl::StartsWith(server, "unix:") || IsLoopback(host)) continue;
     return absl::FailedPreconditionError(
         absl::StrCat("--server ", server,
-                     " is another machine, and tokens go there; give "
+                     " is another machine, and tokens are sent there; give "
                      "--server-ca FILE, or --insecure if the network between "
-                     "is yours alone"));
+                     "is isolated"));
   }
   return absl::OkStatus();
 }
@@ -80,7 +80,7 @@ absl::Status Gateway::ServeMetrics() {
   metrics_.emplace();
   AddProcessMetrics("tissueform_gateway", SoftwareVersion(), &*metrics_);
   AddCounterMetrics(counters_, &*metrics_);
-  metrics_->AddGauge("tissueform_gateway_ready", "1 while a server behind it takes calls.", {},
+  metrics_->AddGauge("tissueform_gateway_ready", "1 while a server accepts calls.", {},
                      [this] { return pool_.IsReady() ? 1.0 : 0.0; });
   TF_RETURN_IF_ERROR(metrics_->Serve(options_.metrics_port));
   spdlog::info("metrics on http://127.0.0.1:{}/metrics", metrics_->port());

@@ -59,10 +59,10 @@ void AddCounterMetrics(const GatewayCounters& counters, MetricsPage* page) {
     const std::string name(GatewayEventName(event));
     if (event < GatewayEvent::kMalformedRequest) {
       page->AddCounter("tissueform_gateway_events_total",
-                       "Requests, WebSockets and calls that have come.", {{"event", name}}, read);
+                       "Requests, WebSockets and calls received.", {{"event", name}}, read);
     } else {
       page->AddCounter("tissueform_gateway_refusals_total",
-                       "What was refused or given up, by reason.", {{"reason", name}}, read);
+                       "Refused or abandoned requests, by reason.", {{"reason", name}}, read);
     }
   }
 }

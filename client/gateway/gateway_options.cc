@@ -44,71 +44,71 @@ void AddSeconds(CLI::App& app, const std::string& name, std::chrono::seconds* ta
 
 void AddLimits(CLI::App& app, GatewayLimits* limits) {
   AddLimit(app, "--max-header-kib", &limits->header_bytes, kKibibyte, 1024,
-           "line and header fields of a request; more is answered with 431");
+           "size of a request's line and header; 431 above it");
   AddLimit(app, "--max-message-mib", &limits->message_bytes, kMebibyte, kMaxMebibytes,
-           "a message of a client; more is answered with 413, a WebSocket closed with 1009");
+           "size of a client's message; 413 above it, or 1009 on a WebSocket");
   AddLimit(app, "--max-answer-mib", &limits->answer_bytes, kMebibyte, kMaxMebibytes,
-           "a message of a server; more ends the call with RESOURCE_EXHAUSTED");
+           "size of a server's message; RESOURCE_EXHAUSTED above it");
   AddLimit(app, "--max-connections", &limits->connections, 1, kMax,
-           "connections open at the same time, and no more than the descriptors that the process "
-           "may open; others are closed at once");
+           "open connections, at most the file descriptors of the process less 200; further ones "
+           "are closed at once");
   AddLimit(app, "--max-connections-per-address", &limits->connections_per_address, 1, kMax,
-           "of these from one address (IPv6: one network of 64 bits); a proxy in front is one");
-  AddLimit(app, "--max-sockets", &limits->sockets, 1, kMax,
-           "of these that are WebSockets; others are answered with 503");
+           "open connections per address (IPv6: per /64 network); a proxy is one address");
+  AddLimit(app, "--max-sockets", &limits->sockets, 1, kMax, "open WebSockets; 503 above it");
   AddLimit(app, "--calls-per-channel", &limits->calls_per_channel, 1, kMax,
-           "calls at the same time on one connection to a server, fewer than it takes (128)");
+           "calls on one connection to a server, less than its limit (128)");
   AddLimit(app, "--channels-per-server", &limits->channels_per_server, 1, 1024,
-           "connections to each server; a call that finds no room on them is refused with "
+           "connections to each server; without a free one a call is refused with "
            "RESOURCE_EXHAUSTED");
   AddSeconds(app, "--header-seconds", &limits->header_deadline,
-             "for a request's header, from its first byte");
-  AddSeconds(app, "--body-seconds", &limits->body_deadline, "for a request's body or a message");
+             "time for a request's header, from its first byte");
+  AddSeconds(app, "--body-seconds", &limits->body_deadline,
+             "time for a request's body or a message");
   AddSeconds(app, "--start-seconds", &limits->start_deadline,
-             "for the start of a call on a new WebSocket");
+             "time for the start of a call on a new WebSocket");
   AddSeconds(app, "--idle-seconds", &limits->idle_deadline,
-             "how long a connection may ask for nothing (WebSockets: see --stall-seconds)");
+             "time that a connection may be idle (WebSockets: see --stall-seconds)");
   AddSeconds(app, "--stall-seconds", &limits->stall_deadline,
-             "how long a client may take nothing of what waits for it, or answer no ping, and a "
-             "server take nothing of a client");
+             "time that a client may read nothing or answer no ping, and that a "
+             "server may read nothing");
   AddSeconds(app, "--drain-seconds", &limits->drain_deadline,
-             "after SIGTERM or SIGINT, how long clients may take to read their last frames");
+             "seconds after SIGTERM or SIGINT for clients to read their last frames");
 }
 
 void AddLogin(CLI::App& app, LoginConfig* login) {
   app.add_option("--oidc-issuer", login->issuer,
-                 "identity provider by which the planner logs its users in; without it there is no "
+                 "identity provider of the planner's users; without it there is no "
                  "login")
       ->type_name("URL");
   app.add_option("--oidc-client-id", login->client_id,
-                 "the planner's name at the provider: a public client with PKCE")
+                 "the planner's client id at the provider: a public client with PKCE")
       ->type_name("ID");
   app.add_option("--oidc-audience", login->audience,
-                 "for whom tokens are asked for: the server's --token-audience")
+                 "requested audience of tokens: the server's --token-audience")
       ->type_name("AUDIENCE");
-  app.add_option("--oidc-scope", login->scopes, "scopes that are asked for, in one argument")
+  app.add_option("--oidc-scope", login->scopes, "requested scopes, in one argument")
       ->capture_default_str()
       ->type_name("SCOPES");
 }
 
 void AddUpstreamOptions(CLI::App& app, GatewayOptions* options) {
   CLI::Option* ca = app.add_option("--server-ca", options->upstream.roots,
-                                   "authorities in PEM of the servers' certificates: calls to them "
-                                   "are encrypted. Renewed by rewriting the file")
+                                   "authorities of the servers' certificates, in PEM; enables "
+                                   "encryption. Rewrite the file to renew it")
                         ->type_name("FILE");
   CLI::Option* certificate =
       app.add_option("--cert", options->upstream.certificate,
-                     "the gateway's own certificate, for servers that ask for one")
+                     "the gateway's certificate, for servers that request one")
           ->type_name("FILE")
           ->needs(ca);
-  CLI::Option* key = app.add_option("--key", options->upstream.key, "its key")
+  CLI::Option* key = app.add_option("--key", options->upstream.key, "key of the client certificate")
                          ->type_name("FILE")
                          ->needs(certificate);
   certificate->needs(key);
   app.add_flag("--insecure", options->insecure,
-               "without --server-ca also to servers on other machines");
+               "allow unencrypted calls to servers on other machines");
   app.add_option("--trust-forwarded-from", options->trusted_proxies,
-                 "address of a proxy before the gateway whose X-Forwarded-For counts")
+                 "address of a proxy whose X-Forwarded-For is trusted")
       ->type_name("ADDRESS");
 }
 
@@ -121,7 +121,7 @@ std::string SetListen(const std::string& text, GatewayOptions* options) {
   const bool fine = colon != std::string::npos && !host.empty() &&
                     (bracketed || host.find(':') == absl::string_view::npos) &&
                     absl::SimpleAtoi(text.substr(colon + 1), &port) && port >= 0 && port <= 65535;
-  if (!fine) return "HOST:PORT is needed, port 0 for a free one, IPv6 in brackets";
+  if (!fine) return "HOST:PORT required, port 0 for a free one, IPv6 in brackets";
   options->host = std::string(bracketed ? host.substr(1, host.size() - 2) : host);
   options->port = port;
   return {};
@@ -130,10 +130,9 @@ std::string SetListen(const std::string& text, GatewayOptions* options) {
 }  // namespace
 
 void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
-  app.add_option(
-         "--server", options->servers,
-         "address of a tissueform-server, HOST:PORT or unix:/PATH; several may be named, in "
-         "a cluster with their --node-name before it")
+  app.add_option("--server", options->servers,
+                 "address of a tissueform-server, HOST:PORT or unix:/PATH (repeatable); in "
+                 "a cluster NODE=ADDRESS, with its --node-name")
       ->required()
       ->type_name("[NODE=]ADDRESS");
   app.add_option_function<std::string>(
@@ -142,37 +141,37 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
            const std::string error = SetListen(text, options);
            if (!error.empty()) throw CLI::ValidationError("--listen", error);
          },
-         "address and port to listen on; port 0 takes a free one. Anything but loopback is open to "
-         "the network: there is no login and no TLS here")
+         "address and port to listen on; port 0 takes a free one. Other addresses than loopback "
+         "are open to "
+         "the network, without TLS")
       ->default_str("127.0.0.1:8080")
       ->type_name("HOST:PORT");
   AddUpstreamOptions(app, options);
-  app.add_option("--web", options->web, "folder of the built planner; without it none is served")
+  app.add_option("--web", options->web, "folder of the built planner (default: none)")
       ->type_name("DIR");
   app.add_option("--allow-host", options->allowed_hosts,
-                 "name by which browsers reach the gateway, beside the address that it listens on "
-                 "and those of loopback")
+                 "host name of the gateway in browsers, in addition to its own address "
+                 "and loopback")
       ->type_name("HOST");
   app.add_option("--allow-origin", options->allowed_origins,
-                 "origin of pages that may ask it, beside its own: https://planner.example.org")
+                 "allowed origin of other pages: https://planner.example.org")
       ->type_name("ORIGIN");
-  app.add_option("--threads", options->threads, "threads that read and write")
+  app.add_option("--threads", options->threads, "I/O threads")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   AddLogin(app, &options->login);
   AddLimits(app, &options->limits);
   app.add_option("--log-level", options->log_level,
-                 "what is logged on stderr, without names, paths or content")
+                 "log level on stderr; names, paths and content are never logged")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
   app.add_option("--log-format", options->log_format,
-                 "how lines of the log look: for people, or one JSON object each")
+                 "log format: text, or one JSON object per line")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  app.add_option(
-         "--metrics-port", options->metrics_port,
-         "port of 127.0.0.1 on which Prometheus finds /metrics; 0 takes a free one (default: "
-         "there is none)")
+  app.add_option("--metrics-port", options->metrics_port,
+                 "port of 127.0.0.1 for Prometheus' /metrics; 0 takes a free one (default: "
+                 "none)")
       ->check(CLI::Range(0, 65535));
   AddConfiguration(app, "TISSUEFORM_GATEWAY_");  // last: it looks at all options
 }

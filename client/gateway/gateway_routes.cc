@@ -43,16 +43,16 @@ constexpr absl::string_view kRequestHeaders =
 
 constexpr std::array<std::pair<int, absl::string_view>, 11> kSentences = {{
     {200, "ok\n"},
-    {400, "this is no request that the gateway understands\n"},
+    {400, "invalid request\n"},
     {403, "this origin is not allowed; see --allow-origin\n"},
-    {404, "there is nothing here\n"},
-    {405, "this method is not for this path\n"},
-    {413, "the body is larger than the gateway takes\n"},
-    {415, "calls are binary gRPC-Web: application/grpc-web+proto\n"},
+    {404, "not found\n"},
+    {405, "method not allowed here\n"},
+    {413, "the body is too large\n"},
+    {415, "only binary gRPC-Web is supported: application/grpc-web+proto\n"},
     {421, "this host is not allowed; see --allow-host\n"},
-    {426, "a call over a WebSocket: subprotocol tissueform.v1\n"},
-    {431, "the header is larger than the gateway takes\n"},
-    {503, "no server takes calls now, or the gateway is full; try again in a moment\n"},
+    {426, "a WebSocket call needs the subprotocol tissueform.v1\n"},
+    {431, "the header is too large\n"},
+    {503, "no server accepts calls now, or the gateway is full; try again in a moment\n"},
 }};
 
 bool IsReading(const HttpHead& head) { return head.method == "GET" || head.method == "HEAD"; }

@@ -69,7 +69,7 @@ class BeastServer final : public HttpServer {
     for (const auto& connection : context_.live.All()) connection->Abort();
     // Calls that were cancelled end soon, whatever the server does.
     if (!context_.live.WaitUntilNone(now + 3 * context_.limits.drain_deadline)) {
-      spdlog::error("connections are left that do not end");
+      spdlog::error("some connections do not end");
     }
   }
 

@@ -45,25 +45,24 @@ bool IsPrintable(absl::string_view text) {
 absl::Status CheckLoginConfig(const LoginConfig& config) {
   if (config.issuer.empty() && config.client_id.empty()) return absl::OkStatus();
   if (config.client_id.empty() || config.issuer.empty()) {
-    return absl::InvalidArgumentError(
-        "--oidc-issuer and --oidc-client-id belong together: give both, or neither");
+    return absl::InvalidArgumentError("give both --oidc-issuer and --oidc-client-id, or neither");
   }
   const bool has_query = config.issuer.find_first_of("?# ") != std::string::npos;
   if (HttpOrigin(config.issuer).empty() || has_query || !IsPrintable(config.issuer)) {
     return absl::InvalidArgumentError(
-        "--oidc-issuer: https://HOST[:PORT][/PATH] is needed, without query (http on loopback "
+        "--oidc-issuer must be https://HOST[:PORT][/PATH], without query (http on loopback "
         "only)");
   }
   if (config.issuer.find('{') != std::string::npos) {
     return absl::InvalidArgumentError(
         absl::StrCat("--oidc-issuer ", config.issuer,
-                     " has a placeholder, which no provider has for its name; put your tenant's id "
+                     " has a placeholder; replace it with your tenant's id "
                      "in its place"));
   }
   if (!IsPrintable(config.client_id) || !IsPrintable(config.audience) ||
       !IsPrintable(config.scopes)) {
     return absl::InvalidArgumentError(
-        "--oidc-client-id, --oidc-audience and --oidc-scope are printable ASCII");
+        "--oidc-client-id, --oidc-audience and --oidc-scope must be printable ASCII");
   }
   return absl::OkStatus();
 }

@@ -23,10 +23,10 @@
 namespace {
 
 constexpr char kDescription[] =
-    "Gives browsers the planner's files and passes their calls on to tissueform-server: gRPC-Web "
-    "and WebSockets (docs/gateway.md). Keeps nothing.\n"
+    "Serves the planner to browsers and passes their calls to tissueform-server: gRPC-Web "
+    "and WebSockets (docs/gateway.md). Stores nothing.\n"
     "Prints `listening on URL` on stdout when it is ready; logs go to stderr.\n"
-    "SIGTERM or SIGINT: tells every client, exit code 0.\n"
+    "SIGTERM or SIGINT: notifies every client, exit code 0.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";
 
 enum ExitCode : int { kExitDone = 0, kExitFailed = 1 };

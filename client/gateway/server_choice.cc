@@ -66,16 +66,16 @@ absl::Status ServerChoice::Check(const std::vector<NodeAddress>& servers) {
     }
     if (!IsAddress(address)) {
       return absl::InvalidArgumentError(
-          absl::StrCat(which, " is no address; give HOST:PORT or unix:/PATH"));
+          absl::StrCat(which, " is not an address; give HOST:PORT or unix:/PATH"));
     }
     if (node.empty()) continue;
     if (!IsNodeName(node)) {
       return absl::InvalidArgumentError(absl::StrCat(
-          which, ": a node's name is 1 to 64 letters, digits and \"-_.:\"; give NODE=ADDRESS"));
+          which, ": a node name has 1 to 64 letters, digits and \"-_.:\"; give NODE=ADDRESS"));
     }
     if (!names.insert(node).second) {
       return absl::InvalidArgumentError(
-          absl::StrCat(which, ": another server has that name; give each its own"));
+          absl::StrCat(which, ": duplicate name; give each server its own"));
     }
   }
   return absl::OkStatus();
@@ -88,12 +88,12 @@ absl::StatusOr<std::vector<size_t>> ServerChoice::Candidates(
   if (!node.empty()) {
     for (const size_t place : places) {
       if (servers_[place].node != node) continue;
-      if (!is_serving(place)) return WrongNode("takes no calls now");
+      if (!is_serving(place)) return WrongNode("accepts no calls now");
       return std::vector<size_t>{place};
     }
     const auto named = [this](size_t place) { return !servers_[place].node.empty(); };
     places.erase(std::remove_if(places.begin(), places.end(), named), places.end());
-    if (places.empty()) return WrongNode("is none of this gateway's");
+    if (places.empty()) return WrongNode("is unknown to this gateway");
   }
   std::vector<size_t> serving;
   std::copy_if(places.begin(), places.end(), std::back_inserter(serving), is_serving);

@@ -78,7 +78,7 @@ absl::StatusOr<CallSlot> ServerPool::Take(absl::string_view session, absl::strin
   if (static_cast<int>(channels.size()) >= limits_.channels_per_server) {
     return absl::ResourceExhaustedError(
         absl::StrCat("the gateway has ", limits_.calls_per_channel * limits_.channels_per_server,
-                     " calls open to this server, as many as it may; try again in a moment"));
+                     " open calls to this server, which is the limit; try again in a moment"));
   }
   auto channel = std::make_unique<ServerChannel>();
   channel->channel = grpc::CreateCustomChannel(choice_.servers()[server].address, credentials_,

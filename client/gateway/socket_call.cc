@@ -146,13 +146,13 @@ void SocketCall::OnBadMessage(SocketClose why) {
   const bool is_text = why == SocketClose::kText;
   Fail(is_text ? GatewayEvent::kTextFrame : GatewayEvent::kMessageTooLarge,
        absl::InvalidArgumentError(is_text ? "frame: text; send binary messages"
-                                          : "frame: larger than the gateway takes; send less"),
+                                          : "frame: too large"),
        why);
 }
 
 void SocketCall::OnSilence() {
   Fail(GatewayEvent::kNoStart,
-       absl::DeadlineExceededError("no start has come; open the socket when there is a call"),
+       absl::DeadlineExceededError("no start frame arrived; open the socket when there is a call"),
        SocketClose::kNormal);
 }
 
@@ -163,7 +163,7 @@ void SocketCall::OnGone() {
 }
 
 void SocketCall::OnDrain() {
-  Finish(EndOf(absl::UnavailableError("the gateway ends; connect again in a moment")),
+  Finish(EndOf(absl::UnavailableError("the gateway is shutting down; connect again in a moment")),
          SocketClose::kGoingAway);
 }
 

@@ -60,7 +60,7 @@ absl::StatusOr<SocketFrame> ParseClientFrame(absl::string_view frame) {
     return NoFrame("its payload does not begin at 32");
   }
   if (GetNumber(frame, 4, 4) != frame.size() - kSocketFrameHeadBytes) {
-    return NoFrame("its payload is not as long as it says");
+    return NoFrame("its payload has another length than stated");
   }
   const absl::string_view unused = frame.substr(8, kSocketFrameHeadBytes - 8);
   if (std::any_of(unused.begin(), unused.end(), [](char c) { return c != 0; })) {
@@ -77,16 +77,16 @@ absl::StatusOr<SocketFrame> ParseClientFrame(absl::string_view frame) {
 absl::StatusOr<CallStart> ParseStart(absl::string_view payload) {
   v1::GatewayCallStart message;
   if (!message.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) {
-    return NoFrame("its payload is no GatewayCallStart");
+    return NoFrame("its payload is not a GatewayCallStart");
   }
   if (!IsServedMethod(message.method())) {
-    return absl::UnimplementedError("start: only methods of tissueform.v1 are served here");
+    return absl::UnimplementedError("start: only methods of tissueform.v1 are served");
   }
   CallStart start = {.method = message.method()};
   for (const auto& [name, value] : message.metadata()) {
     if (!MayBeSent(name)) {
       return absl::InvalidArgumentError(
-          "start: metadata may be authorization, x-tissueform-session, x-tissueform-node and "
+          "start: allowed metadata are authorization, x-tissueform-session, x-tissueform-node and "
           "traceparent");
     }
     start.metadata.emplace(name, value);
@@ -108,7 +108,7 @@ absl::StatusOr<CallStart> ParseStart(absl::string_view payload) {
 absl::StatusOr<std::string> MessageFrame(const grpc::ByteBuffer& message,
                                          const google::protobuf::Descriptor* type) {
   std::vector<grpc::Slice> slices;
-  if (!message.Dump(&slices).ok()) return absl::InternalError("an answer cannot be read");
+  if (!message.Dump(&slices).ok()) return absl::InternalError("an answer is invalid");
   const size_t size = message.Length();
   std::string payload;
   payload.reserve(size);

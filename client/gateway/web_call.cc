@@ -75,9 +75,9 @@ absl::Status WebCall::TryBegin(const HttpHead& head, absl::string_view body, Ser
     return status;
   };
   if (KindOf(head.Path()) == MethodKind::kLong) {
-    return counted(GatewayEvent::kMethodRefused,
-                   absl::UnimplementedError(
-                       "this method goes over a WebSocket: GET /call, see docs/gateway.md"));
+    return counted(
+        GatewayEvent::kMethodRefused,
+        absl::UnimplementedError("this method needs a WebSocket: GET /call, see docs/gateway.md"));
   }
   auto start = StartOf(head);
   if (!start.ok()) return counted(GatewayEvent::kMetadataRefused, start.status());
@@ -145,7 +145,7 @@ void WebCall::OnGone() { Done(); }
 void WebCall::OnDrain() {
   if (end_.has_value() || reply_ == nullptr) return;
   if (const auto upstream = std::move(upstream_); upstream != nullptr) upstream->Cancel();
-  OnEnd(EndOf(absl::UnavailableError("the gateway ends; try again in a moment")));
+  OnEnd(EndOf(absl::UnavailableError("the gateway is shutting down; try again in a moment")));
 }
 
 void WebCall::Done() {

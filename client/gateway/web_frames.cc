@@ -57,18 +57,17 @@ bool IsWebContentType(absl::string_view content_type) {
 
 absl::StatusOr<absl::string_view> ParseWebRequest(absl::string_view body) {
   if (body.size() < kHeadBytes) {
-    return absl::InvalidArgumentError(
-        "request: it ends within the head of its frame; send one message");
+    return absl::InvalidArgumentError("request: the frame's head is incomplete; send one message");
   }
   const auto flag = static_cast<uint8_t>(body[0]);
   if (flag == kCompressedFlag) {
-    return absl::UnimplementedError("request: the message is compressed; send it as it is");
+    return absl::UnimplementedError("request: the message is compressed; send it uncompressed");
   }
   if (flag != kMessageFlag) {
-    return absl::InvalidArgumentError("request: the frame is no message; send one message");
+    return absl::InvalidArgumentError("request: the frame is not a message; send one message");
   }
   if (SizeIn(body) != body.size() - kHeadBytes) {
-    return absl::InvalidArgumentError(absl::StrCat("request: the frame says ", SizeIn(body),
+    return absl::InvalidArgumentError(absl::StrCat("request: the frame states ", SizeIn(body),
                                                    " bytes, ", body.size() - kHeadBytes,
                                                    " follow; send one message"));
   }

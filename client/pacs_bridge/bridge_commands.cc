@@ -45,13 +45,13 @@ PlanWork PlanWorkOf(BridgeParts* parts, const BridgeOptions& options) {
 
 void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
   absl::PrintF(
-      "%s goes to the study of\n  name        %s\n  born        %s\n  patient ID  %s\n"
+      "%s will be stored in the study of\n  name        %s\n  born        %s\n  patient ID  %s\n"
       "  study of    %s\n",
       queued.name, ShownName(study.patient.name), ShownDate(study.patient.birth_date),
       study.patient.id, ShownDate(study.date));
   if (!study.patient.readable) {
     absl::PrintF(
-        "  a text of this patient cannot be read as it was meant: compare with the PACS before you "
+        "  a text of this patient could not be decoded: compare with the PACS before you "
         "store\n");
   }
   if (!queued.note.empty()) absl::PrintF("  note        %s\n", queued.note);
@@ -64,11 +64,11 @@ absl::Status StepToTheEnd(ExportWork* work, QueuedExport* queued) {
     if (queued->state == BridgeExportState::kFailed) {
       if (queued->done_s == 0) work->Step(queued).IgnoreError();
       return absl::FailedPreconditionError(absl::StrCat(queued->name, " has failed: ", queued->note,
-                                                        "; ask for it once more in the planner"));
+                                                        "; request it again in the planner"));
     }
     TF_RETURN_IF_ERROR(status);
     if (queued->state == BridgeExportState::kAsked) {
-      return absl::AbortedError(absl::StrCat(queued->note, "; look at the patient again"));
+      return absl::AbortedError(absl::StrCat(queued->note, "; check the patient again"));
     }
   }
   return absl::OkStatus();
@@ -81,23 +81,25 @@ BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : op
   app.require_subcommand(0, 1);
   run_ = app.add_subcommand("run", "receive, build, publish and store, by rules, until SIGTERM");
   listen_ = app.add_subcommand("listen", "receive only, until SIGTERM");
-  fetch_ = app.add_subcommand("fetch", "have the PACS send the series of a study");
+  fetch_ = app.add_subcommand("fetch", "request the series of a study from the PACS");
   CLI::Option* const study = fetch_->add_option("STUDY", name_, "its StudyInstanceUID");
   fetch_
       ->add_option("--accession", accession_,
-                   "its accession number instead, by which the PACS may know several")
+                   "its accession number instead; the PACS may have several studies")
       ->type_name("NUMBER")
       ->excludes(study);
-  series_ = app.add_subcommand("series", "what was received, and why it was chosen or not");
-  build_ = app.add_subcommand("build", "build and pack the plan of a series, whatever rules say");
+  series_ = app.add_subcommand("series", "received series, and why each was chosen or not");
+  build_ =
+      app.add_subcommand("build", "build and pack the plan of a series, regardless of the rules");
   build_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
-  publish_ = app.add_subcommand("publish", "give the server the case that was built of a series");
-  publish_->add_option("SERIES", name_, "its key")->required();
-  store_ = app.add_subcommand("store", "show whose prediction it is, and store it in the PACS");
+  publish_ = app.add_subcommand("publish", "publish the case of a series to the server");
+  publish_->add_option("SERIES", name_, "key of the client certificate")->required();
+  store_ =
+      app.add_subcommand("store", "show the patient of a prediction, and store it in the PACS");
   store_->add_option("EXPORT", name_, "exports/ID, as `status` shows it")->required();
   store_->add_flag("--confirm-patient", confirmed_,
-                   "store it: you have compared the patient that was shown");
-  status_ = app.add_subcommand("status", "how far everything in the queue is; names no patient");
+                   "store it: you have compared the patient shown");
+  status_ = app.add_subcommand("status", "status of the queue, without patient data");
   status_->add_flag("--json", json_, "as JSON");
 }
 
@@ -117,17 +119,17 @@ int BridgeCommands::Run() const {
     return 1;
   }
   absl::FPrintF(stderr,
-                "tissueform-pacs: say what to do: run, listen, fetch, series, build, "
+                "tissueform-pacs: name a command: run, listen, fetch, series, build, "
                 "publish, store or status; see --help\n");
   return 2;
 }
 
 absl::Status BridgeCommands::Fetch() const {
   if (name_.empty() && accession_.empty()) {
-    return absl::InvalidArgumentError("which study? give its UID, or --accession NUMBER");
+    return absl::InvalidArgumentError("name a study by its UID, or --accession NUMBER");
   }
   if (!options_->has_pacs()) {
-    return absl::FailedPreconditionError("which PACS? give --pacs HOST:PORT or --pacs-url URL");
+    return absl::FailedPreconditionError("name the PACS: --pacs HOST:PORT or --pacs-url URL");
   }
   BridgeOptions options = *options_;
   options.quiet = std::chrono::seconds(0);  // when it returns everything has come
@@ -158,8 +160,8 @@ absl::Status BridgeCommands::Fetch() const {
   if (failed == 0) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat(failed,
-                   " objects of the study did not come; look into the PACS's log and at "
-                   "the disk here, and fetch it again"));
+                   " objects of the study did not arrive; check the PACS's log and "
+                   "the local disk, and fetch it again"));
 }
 
 absl::Status BridgeCommands::Series() const {
@@ -179,7 +181,7 @@ absl::Status BridgeCommands::Build() const {
   // What was chosen goes on; all else begins anew, also a plan that lies there, since the recipe
   // may say something else now.
   if (series.state != SeriesState::kChosen || series.recipe != recipe) {
-    TF_RETURN_IF_ERROR(parts->intake().Choose(series, recipe, "chosen by hand"));
+    TF_RETURN_IF_ERROR(parts->intake().Choose(series, recipe, "chosen manually"));
     TF_ASSIGN_OR_RETURN(series, rows.Get(name_));
   }
   PlanWork work = PlanWorkOf(parts.get(), *options_);
@@ -228,7 +230,7 @@ absl::Status BridgeCommands::Store() const {
   PrintPatient(study, queued);
   if (queued.state == BridgeExportState::kAsked) {
     if (!confirmed_) {
-      absl::PrintF("compare, then give --confirm-patient to store it\n");
+      absl::PrintF("compare the patient, then store it with --confirm-patient\n");
       return absl::OkStatus();
     }
     TF_RETURN_IF_ERROR(exports.Confirm(name_, DigestOf(study.patient)));

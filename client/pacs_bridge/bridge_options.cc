@@ -42,7 +42,7 @@ void AddAddress(CLI::App& app, const std::string& name, std::string* host, int* 
                                  if (colon == std::string::npos || colon == 0 ||
                                      !absl::SimpleAtoi(text.substr(colon + 1), &number) ||
                                      number < 0 || number > kMaxPort) {
-                                   throw CLI::ValidationError(name, "HOST:PORT is needed");
+                                   throw CLI::ValidationError(name, "HOST:PORT required");
                                  }
                                  *host = text.substr(0, colon);
                                  *port = static_cast<int>(number);
@@ -54,34 +54,36 @@ void AddAddress(CLI::App& app, const std::string& name, std::string* host, int* 
 
 void AddReceiver(CLI::App& app, BridgeOptions* options) {
   ReceiverOptions* receiver = &options->receiver;
-  app.add_option("--ae-title", receiver->ae_title, "the bridge's own AE title")
+  app.add_option("--ae-title", receiver->ae_title, "AE title of the bridge")
       ->capture_default_str()
       ->type_name("AE");
   receiver->port = 11112;
   AddAddress(app, "--listen", &receiver->address, &receiver->port, true,
-             "where images are received; port 0 takes a free one");
+             "address for receiving images; port 0 takes a free one");
   app.add_option("--allow-ae", receiver->calling_ae_titles,
-                 "AE title that may send; may be given again. Without one nobody may")
+                 "allowed calling AE title (repeatable; default: none)")
       ->type_name("AE");
   app.add_option("--allow-from", receiver->addresses,
-                 "IPv4 address or network (10.1.2.0/24) from which images are taken")
+                 "allowed IPv4 address or network (10.1.2.0/24) of senders")
       ->default_str("127.0.0.1")
       ->type_name("ADDRESS");
   AddNumber(
       app, "--max-associations", receiver->max_associations, 1, 1024,
       [receiver](int64_t value) { receiver->max_associations = static_cast<int>(value); },
-      "associations at once; who comes later is refused for now");
+      "concurrent associations; further ones are refused temporarily");
   AddNumber(
       app, "--watermark-mib", options->watermark_bytes / kBytesOfMebibyte, 1, kMaxSetting,
       [options](int64_t value) { options->watermark_bytes = value * kBytesOfMebibyte; },
-      "what stays free on the disk; an image that would take it is answered with 0xA700");
+      "minimum free disk space; below it C-STORE is refused with 0xA700");
   CLI::Option* certificate =
       app.add_option("--dicom-cert", options->tls.certificate,
-                     "the bridge's certificate for DICOM, PEM: then nothing is received plain")
+                     "the bridge's certificate for DICOM, PEM; requires TLS for receiving")
           ->type_name("FILE");
-  CLI::Option* key = app.add_option("--dicom-key", options->tls.key, "its key")->type_name("FILE");
+  CLI::Option* key =
+      app.add_option("--dicom-key", options->tls.key, "key of the client certificate")
+          ->type_name("FILE");
   CLI::Option* authorities = app.add_option("--dicom-ca", options->tls.authorities,
-                                            "authorities of those who may send, and of the PACS")
+                                            "authorities of senders and of the PACS")
                                  ->type_name("FILE");
   certificate->needs(key)->needs(authorities);
   key->needs(certificate);
@@ -89,20 +91,20 @@ void AddReceiver(CLI::App& app, BridgeOptions* options) {
 
 void AddPacs(CLI::App& app, PacsPeer* pacs) {
   AddAddress(app, "--pacs", &pacs->host, &pacs->port, false,
-             "the PACS by DICOM associations: where it listens");
+             "address of the PACS for DICOM associations");
   app.add_option("--pacs-ae-title", pacs->ae_title, "its AE title")->type_name("AE");
   app.add_option_function<std::string>(
          "--pacs-fetch",
          [pacs](const std::string& how) {
            pacs->fetch = how == "move" ? PacsPeer::Fetch::kMove : PacsPeer::Fetch::kGet;
          },
-         "how series are fetched: get (C-GET), or move (C-MOVE to --ae-title, which the PACS must "
+         "retrieval: get (C-GET), or move (C-MOVE to --ae-title, which the PACS must "
          "know)")
       ->check(CLI::IsMember({"get", "move"}))
       ->default_str("get");
   app.add_flag_callback(
       "--pacs-tls", [pacs] { pacs->tls.emplace(); },
-      "speak to it by TLS, with --dicom-cert, --dicom-key and --dicom-ca");
+      "use TLS, with --dicom-cert, --dicom-key and --dicom-ca");
   app.add_option("--pacs-url", pacs->url,
                  "the PACS by DICOMweb instead: https://pacs.example.org/dicom-web")
       ->type_name("URL")
@@ -111,16 +113,16 @@ void AddPacs(CLI::App& app, PacsPeer* pacs) {
 
 void AddPlans(CLI::App& app, BridgeOptions* options) {
   app.add_option("--rules", options->rules,
-                 "which series becomes a plan, and by which recipe: JSON (docs/pacs.md)")
+                 "rules that select series and recipes: JSON (docs/pacs.md)")
       ->type_name("FILE");
   app.add_option("--recipe", options->recipe,
-                 "the recipe where there are no --rules (docs/recipe-format.md)")
+                 "the recipe if there are no --rules (docs/recipe-format.md)")
       ->type_name("FILE");
   AddNumber(
       app, "--quiet-seconds", options->quiet.count(), 1, 24 * 3600,
       [options](int64_t value) { options->quiet = std::chrono::seconds(value); },
-      "a series is complete, or has stopped midway, when nothing came for so long; at once "
-      "where its association ends and the PACS counts as many images");
+      "a series without new images for so long is complete or interrupted; complete at once "
+      "if its association ends and the PACS counts as many images");
   PlanWorkOptions* plan = &options->plan;
   AddNumber(
       app, "--plan-threads", plan->threads, 0, 1024,
@@ -129,49 +131,50 @@ void AddPlans(CLI::App& app, BridgeOptions* options) {
   AddNumber(
       app, "--plan-seconds", plan->max_seconds, 1, kMaxSetting,
       [plan](int64_t value) { plan->max_seconds = static_cast<int>(value); },
-      "of processor time, after which `plan build` is ended");
+      "processor time after which `plan build` is stopped");
   AddNumber(
       app, "--plan-memory-mib", plan->max_memory_bytes / kBytesOfMebibyte, 256, kMaxSetting,
       [plan](int64_t value) { plan->max_memory_bytes = value * kBytesOfMebibyte; },
-      "memory that `plan build` may take");
+      "memory limit of `plan build`");
   app.add_flag("--accept-defects", plan->accept_defects,
-               "publish also a plan that misses a quality requirement");
+               "also publish plans that miss a quality requirement");
 }
 
 void AddServer(CLI::App& app, BridgeOptions* options) {
   app.add_option("--server", options->server,
-                 "the tissueform-server: cases are published there, and planners' wishes heard")
+                 "tissueform-server for publishing cases and receiving export requests")
       ->type_name("HOST:PORT");
   ConnectionOptions* connection = &options->connection;
-  app.add_flag("--server-tls", connection->tls, "encrypted, with this machine's authorities");
+  app.add_flag("--server-tls", connection->tls,
+               "use TLS with this machine's certificate authorities");
   app.add_option("--server-ca", connection->tls_ca,
-                 "encrypted, with these authorities of the server's certificate (PEM)")
+                 "use TLS with the certificate authorities in this file (PEM)")
       ->type_name("FILE");
   app.add_option("--server-cert", connection->tls_certificate,
-                 "the bridge's certificate, where the server asks for one")
+                 "the bridge's certificate, if the server requests one")
       ->type_name("FILE");
-  app.add_option("--server-key", connection->tls_key, "its key")->type_name("FILE");
+  app.add_option("--server-key", connection->tls_key, "key of the client certificate")
+      ->type_name("FILE");
   app.add_option("--server-token-file", connection->token_file,
-                 "the bridge's token, with the roles publisher and bridge; mode 0600, read again "
-                 "when it is renewed")
+                 "the bridge's token, with the roles publisher and bridge; mode 0600, reloaded "
+                 "when renewed")
       ->type_name("FILE");
 }
 
 void AddReview(CLI::App& app, BridgeOptions* options) {
   ReviewOptions* review = &options->review;
   AddAddress(app, "--review-listen", &review->address, &review->port, true,
-             "where the work list is served; port 0 takes a free one. It shows names of patients");
+             "address of the review page; port 0 takes a free one. It shows patient names");
   app.add_flag_callback(
       "--no-review", [options] { options->has_review = false; },
-      "serve none: exports are confirmed by `tissueform-pacs store`");
-  app.add_option("--review-host", review->allowed_hosts,
-                 "name by which browsers reach it, behind a proxy")
+      "no review page: confirm exports with `tissueform-pacs store`");
+  app.add_option("--review-host", review->allowed_hosts, "its host name behind a proxy")
       ->type_name("HOST");
   app.add_option("--review-token-file", review->token_file,
-                 "its password (HTTP Basic, any name), mode 0600; needed off loopback")
+                 "its password (HTTP Basic, any name), mode 0600; required off loopback")
       ->type_name("FILE");
   app.add_option("--planner-url", review->planner_url,
-                 "the planner, to which the work list links: https://planner.example.org/")
+                 "the planner linked from the review page: https://planner.example.org/")
       ->type_name("URL");
 }
 
@@ -179,26 +182,26 @@ void AddRetention(CLI::App& app, RetentionOptions* retention) {
   AddNumber(
       app, "--keep-images", retention->keep_images.count() / 24, 0, 36500,
       [retention](int64_t days) { retention->keep_images = std::chrono::hours(days * 24); },
-      "days for which received images, and the plan built of them, are kept after that");
+      "days for which received images and their plan are kept");
   AddNumber(
       app, "--keep-headers", retention->keep_headers.count() / 24, 0, 36500,
       [retention](int64_t days) { retention->keep_headers = std::chrono::hours(days * 24); },
-      "days for which a header without pixels is kept, for where the PACS gives none");
+      "days for which a header without pixels is kept, for a PACS that returns none");
   AddNumber(
       app, "--keep-pending-days", retention->keep_asked.count() / 24, 1, 36500,
       [retention](int64_t days) { retention->keep_asked = std::chrono::hours(days * 24); },
-      "days for which a prediction waits for a person, with its pictures; then it has failed");
+      "days for which a prediction waits for confirmation; then it fails");
   AddNumber(
       app, "--keep-exports", retention->keep_exports.count() / 24, 0, 36500,
       [retention](int64_t days) { retention->keep_exports = std::chrono::hours(days * 24); },
-      "days for which is known how storing a prediction has ended");
+      "days for which results of storing are kept");
 }
 
 }  // namespace
 
 void AddBridgeOptions(CLI::App& app, BridgeOptions* options) {
   app.add_option("--state-dir", options->state_dir,
-                 "folder of the queue and of what is received, 0700 (default: "
+                 "folder of the queue and of received objects, 0700 (default: "
                  "$XDG_STATE_HOME/tissueform-pacs)")
       ->type_name("DIR");
   AddReceiver(app, options);
@@ -208,11 +211,11 @@ void AddBridgeOptions(CLI::App& app, BridgeOptions* options) {
   AddReview(app, options);
   AddRetention(app, &options->retention);
   app.add_option("--log-level", options->log_level,
-                 "what is logged on stderr, by keys of the queue and never by patient")
+                 "log level on stderr; logs contain queue keys, never patient data")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
   app.add_option("--log-format", options->log_format,
-                 "how lines of the log look: for people, or one JSON object each")
+                 "log format: text, or one JSON object per line")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
   AddConfiguration(app, "TISSUEFORM_PACS_");  // last: it looks at all options
@@ -225,7 +228,7 @@ absl::StatusOr<std::string> StateFolderOf(const BridgeOptions& options) {
     const char* const value = std::getenv(variable);
     if (value != nullptr && *value == '/') return absl::StrCat(value, below, "/tissueform-pacs");
   }
-  return absl::FailedPreconditionError("no folder for the queue; give --state-dir DIR");
+  return absl::FailedPreconditionError("give --state-dir DIR for the queue");
 }
 
 absl::StatusOr<std::vector<SeriesRule>> RulesOf(const BridgeOptions& options) {
@@ -235,8 +238,7 @@ absl::StatusOr<std::vector<SeriesRule>> RulesOf(const BridgeOptions& options) {
   } else if (!options.recipe.empty()) {
     rules.emplace_back().recipe = options.recipe;
   } else {
-    return absl::FailedPreconditionError(
-        "it is not said what becomes a plan; give --rules FILE or --recipe FILE");
+    return absl::FailedPreconditionError("give --rules FILE or --recipe FILE");
   }
   // At the start and not when the first head has come.
   TF_RETURN_IF_ERROR(CheckRecipes(rules));

@@ -40,7 +40,7 @@ class WakingSink final : public InstanceSink {
   absl::Status Keep(const ReceivedInstance& instance) override { return sink_->Keep(instance); }
   void AssociationEnded(const EndedAssociation& ended) override {
     sink_->AssociationEnded(ended);
-    LogLine(!ended.released, absl::StrFormat("association %d has ended: %d objects, %d refused%s%s",
+    LogLine(!ended.released, absl::StrFormat("association %d ended: %d objects, %d refused%s%s",
                                              ended.association, ended.kept, ended.refused,
                                              ended.problem.empty() ? "" : ": ", ended.problem));
     wake_();
@@ -63,7 +63,7 @@ void WaitForEnd() {
 absl::Status CheckRunnable(const BridgeOptions& options) {
   if (options.server.empty()) {
     return absl::FailedPreconditionError(
-        "no server to publish to; give --server HOST:PORT, or `listen` to receive only");
+        "give --server HOST:PORT, or use `listen` to receive only");
   }
   return RulesOf(options).status();
 }
@@ -78,7 +78,7 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
   const std::unique_ptr<ExportWork> exports = everything ? parts->MakeExportWork() : nullptr;
   if (everything && exports == nullptr) {
     LogLine(true,
-            "no PACS is named, so no prediction goes back to one; give --pacs HOST:PORT or "
+            "no PACS to store predictions in; give --pacs HOST:PORT or "
             "--pacs-url URL");
   }
   BridgeService service(
@@ -98,14 +98,14 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
   if (everything && options.has_review) {
     TF_ASSIGN_OR_RETURN(review, ReviewServer::Start(options.review, &parts->queue(),
                                                     [&service] { service.Wake(); }));
-    absl::PrintF("work list on http://%s:%d/\n", options.review.address, review->port());
+    absl::PrintF("review page on http://%s:%d/\n", options.review.address, review->port());
   }
   std::fflush(stdout);
   const SystemdWatchdog watchdog([&service](const std::function<void()>& answered) {
     const std::vector<std::string> stuck = service.Stuck();
     if (stuck.empty()) return answered();
-    LogLine(true, absl::StrCat("at one step for too long: ", absl::StrJoin(stuck, ", "),
-                               "; systemd starts the bridge again"));
+    LogLine(true, absl::StrCat("a step takes too long: ", absl::StrJoin(stuck, ", "),
+                               "; systemd restarts the bridge"));
   });
   TellSystemdReady();
   WaitForEnd();

@@ -22,24 +22,24 @@
 namespace {
 
 constexpr char kDescription[] =
-    "Takes head CTs from a PACS, makes cases of them for planners, and stores predictions back in "
+    "Receives head CTs from a PACS, makes cases for the planner, and stores predictions in "
     "the patient's study (docs/pacs.md).\n"
-    "Begin with: tissueform-pacs run --allow-ae SCANNER --recipe recipe.json --server "
+    "Start with: tissueform-pacs run --allow-ae SCANNER --recipe recipe.json --server "
     "localhost:50051 --pacs pacs:104 --pacs-ae-title PACS\n"
     "SIGTERM or SIGINT: run and listen end between two steps, with exit code 0, the others at "
     "once; "
-    "what they were doing may be repeated.\n"
+    "their work can be repeated.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";
 
 constexpr char kFooter[] =
     "What a person does by hand (not while `run` works on the same --state-dir, but status and "
     "series):\n"
-    "  tissueform-pacs fetch STUDY            have the PACS send a study\n"
-    "  tissueform-pacs series                 what came, and why a series was chosen or not\n"
-    "  tissueform-pacs build SERIES           make a plan of it all the same\n"
-    "  tissueform-pacs publish SERIES         give it to the server\n"
-    "  tissueform-pacs store EXPORT           see whose it is; with --confirm-patient, store it\n"
-    "  tissueform-pacs status --json          where everything is\n"
+    "  tissueform-pacs fetch STUDY            request a study from the PACS\n"
+    "  tissueform-pacs series                 received series, and why each was chosen or not\n"
+    "  tissueform-pacs build SERIES           make a plan regardless of the rules\n"
+    "  tissueform-pacs publish SERIES         publish its case to the server\n"
+    "  tissueform-pacs store EXPORT           show its patient; with --confirm-patient, store it\n"
+    "  tissueform-pacs status --json          status of the queue\n"
     "Exit codes: 0 done, 1 the work failed, 2 wrong use.";
 
 constexpr uint64_t kEndingSignals = (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1));

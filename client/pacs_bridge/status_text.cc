@@ -101,7 +101,7 @@ absl::StatusOr<std::string> SeriesTable(BridgeQueue* queue, SeriesIntake* intake
       if (!WhyOf(series).empty()) absl::StrAppend(&text, "      ", WhyOf(series), "\n");
     }
   }
-  return text.empty() ? "nothing was received yet\n" : text;
+  return text.empty() ? "nothing received yet\n" : text;
 }
 
 }  // namespace tissueform

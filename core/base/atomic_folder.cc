@@ -29,7 +29,7 @@ fs::path Resolved(const std::string& folder) {
 
 absl::Status CannotMake(int error_number, const fs::path& goal) {
   return absl::ErrnoToStatus(error_number,
-                             absl::StrCat("cannot make a folder beside ", goal.string(),
+                             absl::StrCat("cannot create a folder next to ", goal.string(),
                                           "; check permissions and free space"));
 }
 
@@ -40,7 +40,7 @@ absl::Status CheckFillable(const std::string& folder) {
   std::error_code error;
   if (fs::exists(path, error) && !(fs::is_directory(path, error) && fs::is_empty(path, error))) {
     return absl::AlreadyExistsError(
-        absl::StrCat(folder, " is there already and not an empty folder; name a new one"));
+        absl::StrCat(folder, " exists and is not an empty folder; name a new one"));
   }
   if (path == fs::current_path(error)) {
     return absl::FailedPreconditionError(
@@ -90,7 +90,7 @@ absl::Status AtomicFolder::Publish() {
   // An empty folder that has been there is replaced.
   if (rename(path_.c_str(), goal_.c_str()) != 0) {
     return absl::ErrnoToStatus(
-        errno, absl::StrCat("cannot put the result at ", goal_, "; name a new folder"));
+        errno, absl::StrCat("cannot move the result to ", goal_, "; name a new folder"));
   }
   return absl::OkStatus();
 }

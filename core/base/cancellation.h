@@ -22,8 +22,7 @@ class Cancellation {
 
   // Cancelled once it is requested.
   absl::Status Check() const {
-    return requested() ? absl::CancelledError("the caller has cancelled the work")
-                       : absl::OkStatus();
+    return requested() ? absl::CancelledError("the caller canceled the work") : absl::OkStatus();
   }
 
  private:

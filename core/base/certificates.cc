@@ -99,13 +99,13 @@ std::string DateText(std::chrono::system_clock::time_point time) {
 
 absl::Status CheckDates(const CertificateFacts& facts, std::chrono::system_clock::time_point now) {
   if (now > facts.not_after) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "the certificate expired on ", DateText(facts.not_after), "; put a new one there"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("the certificate expired on ", DateText(facts.not_after), "; replace it"));
   }
   if (now < facts.not_before) {
     return absl::InvalidArgumentError(absl::StrCat("the certificate is valid from ",
                                                    DateText(facts.not_before),
-                                                   " only; check the clock of this machine"));
+                                                   "; check the clock of this machine"));
   }
   return absl::OkStatus();
 }
@@ -119,11 +119,11 @@ absl::StatusOr<std::string> ReadPemFile(const std::string& path) {
   text.resize(static_cast<size_t>(std::max<std::streamsize>(file.gcount(), 0)));
   if (!file.is_open() || file.bad()) {
     return absl::NotFoundError(
-        absl::StrCat(path, ": cannot be read; check that it is there and who may read it"));
+        absl::StrCat(path, ": cannot be read; check that it exists and its permissions"));
   }
   if (text.empty() || text.size() > kMaxPemBytes) {
     return absl::InvalidArgumentError(
-        absl::StrCat(path, text.empty() ? ": is empty, or no file" : ": is larger than 1 MiB",
+        absl::StrCat(path, text.empty() ? ": is empty, or not a file" : ": is larger than 1 MiB",
                      "; give a PEM file"));
   }
   return text;
@@ -134,7 +134,7 @@ absl::StatusOr<std::string> ReadSecretPemFile(const std::string& path) {
   const std::filesystem::perms modes = std::filesystem::status(path, error).permissions();
   if (!error && (modes & std::filesystem::perms::others_read) != std::filesystem::perms::none) {
     return absl::FailedPreconditionError(
-        absl::StrCat(path, ": every user of this machine may read the key; chmod o-rwx"));
+        absl::StrCat(path, ": every user of this machine can read the key; chmod o-rwx"));
   }
   return ReadPemFile(path);
 }
@@ -143,7 +143,7 @@ absl::StatusOr<CertificateFacts> ReadCertificate(absl::string_view chain_pem) {
   const Certificate certificate = FirstCertificate(chain_pem);
   if (certificate == nullptr) {
     return absl::InvalidArgumentError(
-        "holds no certificate in PEM (\"-----BEGIN CERTIFICATE-----\")");
+        "has no certificate in PEM (\"-----BEGIN CERTIFICATE-----\")");
   }
   return CertificateFacts{.not_before = TimeOf(X509_get0_notBefore(certificate.get())),
                           .not_after = TimeOf(X509_get0_notAfter(certificate.get())),
@@ -158,8 +158,7 @@ absl::StatusOr<CertificateFacts> CheckIdentity(absl::string_view chain_pem,
   const Key key(PEM_read_bio_PrivateKey(BioOf(key_pem).get(), nullptr, NoPassword, nullptr));
   ERR_clear_error();
   if (key == nullptr) {
-    return absl::InvalidArgumentError(
-        "the key file holds no private key in PEM without a password");
+    return absl::InvalidArgumentError("the key file has no private key in PEM without a password");
   }
   const bool fits = X509_check_private_key(FirstCertificate(chain_pem).get(), key.get()) == 1;
   ERR_clear_error();
@@ -182,7 +181,7 @@ absl::Status CheckAuthorities(absl::string_view pem) {
   ERR_clear_error();
   if (count == 0 || !at_end) {
     return absl::InvalidArgumentError(
-        absl::StrCat("holds no certificate in PEM after the ", count, " that could be read"));
+        absl::StrCat("has no certificate in PEM after the ", count, " that could be read"));
   }
   return absl::OkStatus();
 }

@@ -51,8 +51,8 @@ absl::Status CheckMeshDigest(const Plan& plan, const PlanProblem& problem) {
   if (view.Sha256() == plan.mesh_sha256) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat("mesh ", plan.mesh_path,
-                   ": not the mesh that the plan was made for (mesh_sha256); save the case that "
-                   "the plan was exported from under that name"));
+                   ": not the plan's mesh (mesh_sha256); save the case from which "
+                   "the plan was exported under that name"));
 }
 
 }  // namespace tissueform

@@ -59,9 +59,9 @@ absl::StatusOr<std::vector<int32_t>> VerticesOfPlace(const Json& at, const PlanP
   const SkinPlace* place = FindPlace(places, name);
   if (place == nullptr) {
     if (places.empty()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("the mesh has no places (no point array skin_region), so none called \"",
-                       name, "\"; give point_mm"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "the mesh has no named places (no point array skin_region), so it has no place \"", name,
+          "\"; give point_mm"));
     }
     return absl::InvalidArgumentError(absl::StrCat(
         "the mesh has no place \"", name, "\"; it has ",
@@ -141,7 +141,7 @@ absl::StatusOr<FitRequest> ToRequest(const Json& json, const PlanProblem& proble
   if (json.at("coordinate_system") != of_plan) {
     return absl::InvalidArgumentError(
         absl::StrCat("its coordinate_system is ", json.at("coordinate_system").get<std::string>(),
-                     " and the plan's is ", of_plan, "; write the targets in the plan's"));
+                     " but the plan's is ", of_plan, "; write the targets in the plan's"));
   }
   FitRequest request;
   request.axes = problem.written_in;

@@ -35,9 +35,9 @@ absl::Status CheckInside(const std::string& plan_path, const Plan& plan) {
   const std::filesystem::path folder = std::filesystem::path(plan_path).parent_path();
   for (const std::string& file : FilesOfTetMesh(plan.mesh_path)) {
     if (LiesBelow(file, folder.empty() ? "." : folder)) continue;
-    return absl::PermissionDeniedError(absl::StrCat(
-        "plan ", plan_path, ": its mesh ", file,
-        " lies outside the folder of the plan; put it there, or allow it (--allow-outside)"));
+    return absl::PermissionDeniedError(
+        absl::StrCat("plan ", plan_path, ": its mesh ", file,
+                     " is outside the plan's folder; move it there, or pass --allow-outside"));
   }
   return absl::OkStatus();
 }

@@ -30,7 +30,7 @@ absl::StatusOr<std::vector<std::pair<int64_t, double>>> ToLabelled(const Json& j
     int64_t value = 0;
     if (!absl::SimpleAtoi(label, &value)) {
       return absl::InvalidArgumentError(
-          absl::StrCat("label ", label, " at ", pointer, " is larger than 64 bits hold"));
+          absl::StrCat("label ", label, " at ", pointer, " exceeds 64 bits"));
     }
     labelled.emplace_back(value, number.get<double>());
   }

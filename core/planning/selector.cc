@@ -40,7 +40,7 @@ absl::StatusOr<Selection> Select(const SelectByPointData& choice, const Selectio
 
 absl::StatusOr<Selection> Select(const SelectBox& box, const SelectionSource& source) {
   if ((box.min_mm.array() > box.max_mm.array()).any()) {
-    return absl::InvalidArgumentError("a box has a min above its max; exchange them");
+    return absl::InvalidArgumentError("a box has min above max; swap them");
   }
   Selection selection;
   for (Eigen::Index v = 0; v < source.positions.rows(); ++v) {

@@ -34,9 +34,9 @@ absl::StatusOr<std::vector<double>> Resolve(const StiffnessByCellData& choice, E
     // A NaN is not less than any key nor any key than it: the map would take it for its first one.
     const auto found = std::isnan(values[t]) ? pa_of_value.end() : pa_of_value.find(values[t]);
     if (found == pa_of_value.end()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("tet ", t, " has ", choice.name, " = ", values[t],
-                       ", for which no stiffness is given; add it to values"));
+      return absl::InvalidArgumentError(absl::StrCat("tet ", t, " has ", choice.name, " = ",
+                                                     values[t],
+                                                     ", which has no stiffness; add it to values"));
     }
     values[t] = found->second;
   }

@@ -51,9 +51,9 @@ absl::StatusOr<double> FactorOf(const PlannedUncertainty& planned, double label,
   for (const auto& [value, factor] : chosen->factor_of_value) {
     if (static_cast<double>(value) == label) return factor;
   }
-  return absl::InvalidArgumentError(
-      absl::StrCat(kFactorKey, ": tet ", tet, " has ", chosen->name, " = ", label,
-                   ", for which no factor is given; add it to values"));
+  return absl::InvalidArgumentError(absl::StrCat(kFactorKey, ": tet ", tet, " has ", chosen->name,
+                                                 " = ", label,
+                                                 ", which has no factor; add it to values"));
 }
 
 // In the order of their labels.
@@ -70,9 +70,9 @@ absl::StatusOr<MaterialUncertainty> TissuesOf(const PlannedUncertainty& planned,
     if (!tissue_of_label.emplace(label, 0).second) continue;
     TF_RETURN_IF_ERROR(FactorOf(planned, label, t).status());
     if (tissue_of_label.size() > kMaxTissues) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          kFactorKey, ": more than ", kMaxTissues,
-          " kinds of tissue; name a cell array of labels (by_cell_data) that tells fewer apart"));
+      return absl::InvalidArgumentError(
+          absl::StrCat(kFactorKey, ": more than ", kMaxTissues,
+                       " kinds of tissue; use a cell array of labels (by_cell_data) with fewer"));
     }
   }
   for (auto& [label, tissue] : tissue_of_label) {
@@ -94,7 +94,7 @@ absl::Status CheckPoissonRange(const Plan& plan) {
   }
   return absl::InvalidArgumentError(
       absl::StrCat("uncertainty/poisson_ratio_95: [", (*range)[0], ", ", (*range)[1],
-                   "] must be rising and hold poisson_ratio, which is ", plan.poisson_ratio));
+                   "] must be ascending and contain poisson_ratio, which is ", plan.poisson_ratio));
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ def captured(programs, folder):
 
 
 def screenshot(programs, name):
-    """The work list as a browser shows it, where one is installed."""
+    """The review page as a browser shows it, where one is installed."""
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         return
@@ -75,7 +75,7 @@ def screenshot(programs, name):
     command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1200,1000",
                f"--user-data-dir={programs.folder / 'browser'}", f"--screenshot={picture}", f"http://{stack.HOST}:{programs.review_port}/"]
     shot = subprocess.run(command, capture_output=True, timeout=stack.PATIENCE_S, check=False)
-    print(f"  the work list: {picture}" if shot.returncode == 0 and picture.exists() else "  the browser has made no picture of the work list")
+    print(f"  the review page: {picture}" if shot.returncode == 0 and picture.exists() else "  the browser has made no picture of the review page")
 
 
 def run(programs, web):
@@ -101,12 +101,12 @@ def run(programs, web):
     prediction = programs.predict(case)
     tell(f"a planner stores {prediction} and sends it to the PACS")
     programs.tissueform("prediction", "send", prediction)
-    form = programs.wait_for("the work list's question, with pictures",
+    form = programs.wait_for("the review page's question, with pictures",
                              lambda: "<img" in programs.review() and (programs.forms() or [None])[0], needs="bridge")
-    tell("the work list shows the patient, with pictures, and asks")
+    tell("the review page shows the patient, with pictures, and asks")
     screenshot(programs, "review.png")
     programs.confirm(form)
-    tell("confirmed in the work list")
+    tell("confirmed in the review page")
     programs.wait_for("the objects", lambda: ": stored" in programs.tissueform("prediction", "send", prediction).stdout
                       or " stored " in programs.tissueform("prediction", "sent").stdout, needs="bridge")
     tell("stored; QIDO-RS lists the study's series:")
@@ -126,7 +126,7 @@ def main():
     parser = argparse.ArgumentParser(prog="deploy/pacs/demo.sh", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
     parser.add_argument("--web", required=True, help=argparse.SUPPRESS)
-    parser.add_argument("--serve", action="store_true", help="keep all of it running until Ctrl-C; the last lines say where work list and planner are")
+    parser.add_argument("--serve", action="store_true", help="keep all of it running until Ctrl-C; the last lines say where review page and planner are")
     parser.add_argument("--folder", metavar="DIR", help="where logs, pictures, objects and the keys of this one time go (default: a new temporary folder)")
     words = parser.parse_args()
     missing = stack.missing_programs()
@@ -143,7 +143,7 @@ def main():
         if not words.serve:
             print("the programs end now; with --serve they keep running")
             return
-        print(f"work list http://{stack.HOST}:{programs.review_port}/\nplanner   http://localhost:{programs.gateway_port}/\nCtrl-C ends it", flush=True)
+        print(f"review page http://{stack.HOST}:{programs.review_port}/\nplanner   http://localhost:{programs.gateway_port}/\nCtrl-C ends it", flush=True)
         try:
             while all(process.poll() is None for process in programs.running.values()):
                 time.sleep(1)

@@ -8,7 +8,7 @@
 #
 #   deploy/pacs/demo.sh [--serve] [--folder DIR]
 #
-# With --serve all keep running until Ctrl-C: work list and planner are where the last lines say; otherwise the programs end
+# With --serve all keep running until Ctrl-C: review page and planner are where the last lines say; otherwise the programs end
 # with the script. What they have written, logs, pictures and the keys of this one time, stays in DIR (a temporary folder
 # unless it is named).
 #

@@ -314,7 +314,7 @@ backend orthanc
             return reply.read().decode()
 
     def forms(self):
-        """What the work list asks a person for: the fields of each form."""
+        """What the review page asks a person for: the fields of each form."""
         forms = re.findall(r"<form[^>]*action=\"/store\">(.*?)</form>", self.review(), re.DOTALL)
         return [dict(re.findall(r"name=\"(\w+)\" value=\"([^\"]*)\"", form)) for form in forms]
 

@@ -33,7 +33,7 @@ std::string CaseName(absl::string_view sha256) { return absl::StrCat(kCasePrefix
 absl::StatusOr<std::string> ParseCaseName(absl::string_view name) {
   if (!absl::ConsumePrefix(&name, kCasePrefix) || !IsSha256Hex(name)) {
     return absl::InvalidArgumentError(
-        "not the name of a case; it is \"cases/{sha256}\" with the digest of the case's file in 64 "
+        "invalid case name; use \"cases/{sha256}\" with the digest of the case's file in 64 "
         "lower-case hexadecimal digits");
   }
   return std::string(name);
@@ -42,11 +42,11 @@ absl::StatusOr<std::string> ParseCaseName(absl::string_view name) {
 absl::Status CheckTitle(absl::string_view title, int max_bytes) {
   if (title.size() > static_cast<size_t>(max_bytes)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("title has ", title.size(), " bytes; it may have ", max_bytes));
+        absl::StrCat("title has ", title.size(), " bytes; the limit is ", max_bytes));
   }
   if (HasControlCharacter(title)) {
     return absl::InvalidArgumentError(
-        "title has a control character, such as a line feed; leave it out");
+        "title has a control character, such as a line feed; remove it");
   }
   return absl::OkStatus();
 }

@@ -40,19 +40,19 @@ bool HoldsControls(absl::string_view text) {
 
 // Empty: nothing.
 absl::string_view WhatIsWrong(const v1::Measure& measure) {
-  if (!IsMeasureName(measure.name())) return "has a name that is none";
+  if (!IsMeasureName(measure.name())) return "has an invalid name";
   if (measure.title().size() > static_cast<size_t>(kMaxMeasureTitleBytes) ||
       HoldsControls(measure.title())) {
-    return "has a title that is too long or holds control characters";
+    return "has a title that is too long or has control characters";
   }
-  if (measure.unit() != "mm" && measure.unit() != "deg") return "is in neither mm nor deg";
+  if (measure.unit() != "mm" && measure.unit() != "deg") return "has a unit other than mm and deg";
   const bool finite = std::isfinite(measure.before()) && std::isfinite(measure.after()) &&
                       std::isfinite(measure.lowest_after()) &&
                       std::isfinite(measure.highest_after());
   if (!finite) return "has a number that is not finite";
   if (measure.has_lowest_after() != measure.has_highest_after() ||
       measure.lowest_after() > measure.highest_after()) {
-    return "has half a range, or one that is turned round";
+    return "has an incomplete or reversed interval";
   }
   return "";
 }
@@ -64,24 +64,24 @@ std::string ExportName(absl::string_view id) { return absl::StrCat(kExportPrefix
 absl::StatusOr<std::string> ParseExportName(absl::string_view name) {
   if (!absl::ConsumePrefix(&name, kExportPrefix) || !IsExportId(name)) {
     return absl::InvalidArgumentError(
-        "not the name of an export; use the name that CreateExport returned, \"exports/{id}\"");
+        "invalid export name; use the name that CreateExport returned, \"exports/{id}\"");
   }
   return std::string(name);
 }
 
 absl::Status CheckMeasures(const google::protobuf::RepeatedPtrField<v1::Measure>& measures) {
   if (measures.size() > kMaxMeasures) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the request has ", measures.size(), " measures; it may have ", kMaxMeasures));
+    return absl::InvalidArgumentError(absl::StrCat("the request has ", measures.size(),
+                                                   " measures; the limit is ", kMaxMeasures));
   }
   std::set<absl::string_view> names;
   for (int i = 0; i < measures.size(); ++i) {
     absl::string_view wrong = WhatIsWrong(measures[i]);
     if (wrong.empty() && !names.insert(measures[i].name()).second) {
-      wrong = "has the name of one before";
+      wrong = "repeats an earlier name";
     }
     if (!wrong.empty()) {
-      return absl::InvalidArgumentError(absl::StrCat("measure ", i, " ", wrong, "; leave it out"));
+      return absl::InvalidArgumentError(absl::StrCat("measure ", i, " ", wrong, "; remove it"));
     }
   }
   return absl::OkStatus();
@@ -93,7 +93,7 @@ absl::Status CheckExportDetail(absl::string_view detail) {
   }
   return absl::InvalidArgumentError(
       absl::StrCat("the detail has over ", kMaxExportDetailBytes,
-                   " bytes or holds control characters; tell it in one short line"));
+                   " bytes or has control characters; write one short line"));
 }
 
 absl::string_view ExportStateText(v1::ExportState state) {

@@ -46,7 +46,7 @@ absl::StatusOr<FitTargetRequest> ToTarget(const v1::FitTarget& proto) {
       break;
     case v1::FitTarget::AT_NOT_SET:
       return absl::InvalidArgumentError(
-          absl::StrCat("target \"", proto.name(), "\" is nowhere; set point_mm or vertices"));
+          absl::StrCat("target \"", proto.name(), "\" has no position; set point_mm or vertices"));
   }
   switch (proto.wanted_case()) {
     case v1::FitTarget::kPositionMm:
@@ -62,7 +62,7 @@ absl::StatusOr<FitTargetRequest> ToTarget(const v1::FitTarget& proto) {
     case v1::FitTarget::WANTED_NOT_SET:
       return absl::InvalidArgumentError(
           absl::StrCat("target \"", proto.name(),
-                       "\" wants nothing; set position_mm, displacement_mm or movement"));
+                       "\" has no goal; set position_mm, displacement_mm or movement"));
   }
   if (proto.has_weight()) target.weight = proto.weight();
   return target;

@@ -185,7 +185,8 @@ EncodedPositions EncodePositions(const FloatPositions& chosen, const VertexChoic
 absl::StatusOr<Positions> DecodePositions(const std::string& bytes, int64_t num_vertices) {
   if (bytes.size() != static_cast<size_t>(num_vertices) * 3 * sizeof(float)) {
     return absl::InternalError(absl::StrCat("the server answered ", bytes.size(), " bytes for ",
-                                            num_vertices, " vertices; it speaks another version"));
+                                            num_vertices,
+                                            " vertices; its version differs from the client's"));
   }
   FloatPositions positions(num_vertices, 3);
   std::memcpy(positions.data(), bytes.data(), bytes.size());

@@ -25,7 +25,7 @@ absl::Status CheckFactors(const v1::MaterialRanges& proto) {
   for (const double factor : proto.factors_95()) {
     if (!(factor >= 1 && factor <= kLargestFactor95)) {
       return absl::InvalidArgumentError(absl::StrCat("ranges.factors_95 holds ", factor,
-                                                     "; a factor is 1 to ", kLargestFactor95));
+                                                     "; a factor must be 1 to ", kLargestFactor95));
     }
   }
   return absl::OkStatus();
@@ -71,7 +71,7 @@ absl::StatusOr<MaterialUncertainty> ToMaterialUncertainty(const v1::MaterialRang
   TF_RETURN_IF_ERROR(CheckPoissonRatios(proto, poisson_ratio));
   if (static_cast<Eigen::Index>(proto.tissues().size()) != num_tets) {
     return absl::InvalidArgumentError(absl::StrCat("ranges.tissues has ", proto.tissues().size(),
-                                                   " bytes; it must be one a tet, ", num_tets));
+                                                   " bytes; it must be one per tet, ", num_tets));
   }
   MaterialUncertainty uncertainty;
   for (const double factor : proto.factors_95()) uncertainty.tissues.push_back({"", factor});
@@ -98,8 +98,9 @@ std::string FloatBytes(const Eigen::VectorXf& values) {
 
 absl::StatusOr<Eigen::VectorXf> FloatsFromBytes(const std::string& bytes, Eigen::Index count) {
   if (bytes.size() != static_cast<size_t>(count) * sizeof(float)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "uncertainty_p95_mm has ", bytes.size(), " bytes; it must be four a vertex, ", 4 * count));
+    return absl::InvalidArgumentError(absl::StrCat("uncertainty_p95_mm has ", bytes.size(),
+                                                   " bytes; it must be four per vertex, ",
+                                                   4 * count));
   }
   Eigen::VectorXf values(count);
   if (count > 0) std::memcpy(values.data(), bytes.data(), bytes.size());

@@ -20,7 +20,7 @@ std::string MeshName(absl::string_view sha256) { return absl::StrCat(kMeshPrefix
 absl::StatusOr<std::string> ParseMeshName(absl::string_view name) {
   if (!absl::ConsumePrefix(&name, kMeshPrefix) || !IsSha256Hex(name)) {
     return absl::InvalidArgumentError(
-        "not the name of a mesh; it is \"meshes/\" and 64 lower-case hexadecimal digits");
+        "invalid mesh name; use \"meshes/\" and 64 lower-case hexadecimal digits");
   }
   return std::string(name);
 }

@@ -79,7 +79,7 @@ absl::StatusOr<GradientFieldOptions> ToGradientFieldOptions(
   }
   if (options.max_iterations > max_iterations) {
     return absl::InvalidArgumentError(absl::StrCat("max_iterations is ", options.max_iterations,
-                                                   "; ask for ", max_iterations, " at most"));
+                                                   "; request ", max_iterations, " at most"));
   }
   if (settings.has_tolerance_mm()) {
     options.tolerance_mm = settings.tolerance_mm();

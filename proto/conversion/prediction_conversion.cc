@@ -32,7 +32,7 @@ std::string PredictionName(absl::string_view id) { return absl::StrCat(kPredicti
 absl::StatusOr<std::string> ParsePredictionName(absl::string_view name) {
   if (!absl::ConsumePrefix(&name, kPredictionPrefix) || !IsPredictionId(name)) {
     return absl::InvalidArgumentError(
-        "not the name of a prediction; use the name that CreatePrediction returned, "
+        "invalid prediction name; use the name that CreatePrediction returned, "
         "\"predictions/{id}\"");
   }
   return std::string(name);

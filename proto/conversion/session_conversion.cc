@@ -36,7 +36,7 @@ absl::Status CheckChosenId(absl::string_view id) {
   if (id.empty() || (IsSessionId(id) && id.size() >= kMinChosenIdBytes)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "session_id must be ", kMinChosenIdBytes, " to ", kMaxSessionIdBytes,
-      " letters, digits and \"-\", hard to guess; leave it out and the server chooses one"));
+      " letters, digits and \"-\", hard to guess; remove it and the server chooses one"));
 }
 
 absl::Status ReadStiffness(const v1::Stiffness& stiffness, SessionRequest* request) {
@@ -64,7 +64,7 @@ absl::Status ReadHandles(const v1::CreateSessionRequest& proto, const SessionReq
     const std::string field = absl::StrCat("handle ", request->handles.size());
     if (handle.name().size() > static_cast<size_t>(limits.max_name_bytes)) {
       return absl::InvalidArgumentError(absl::StrCat("name of ", field, " has ",
-                                                     handle.name().size(), " bytes; it may have ",
+                                                     handle.name().size(), " bytes; the limit is ",
                                                      limits.max_name_bytes));
     }
     TF_ASSIGN_OR_RETURN(std::vector<int32_t> vertices,
@@ -81,7 +81,7 @@ std::string SessionName(absl::string_view id) { return absl::StrCat(kSessionPref
 absl::StatusOr<std::string> ParseSessionName(absl::string_view name) {
   if (!absl::ConsumePrefix(&name, kSessionPrefix) || !IsSessionId(name)) {
     return absl::InvalidArgumentError(
-        "not the name of a session; use the name that CreateSession returned, \"sessions/{id}\"");
+        "invalid session name; use the name that CreateSession returned, \"sessions/{id}\"");
   }
   return std::string(name);
 }
@@ -112,7 +112,7 @@ absl::StatusOr<SessionRequest> ToSessionRequest(const v1::CreateSessionRequest& 
                                                 const SessionRequestLimits& limits) {
   if (proto.request_id().size() > static_cast<size_t>(limits.max_request_id_bytes)) {
     return absl::InvalidArgumentError(absl::StrCat("request_id has ", proto.request_id().size(),
-                                                   " bytes; it may have ",
+                                                   " bytes; the limit is ",
                                                    limits.max_request_id_bytes));
   }
   TF_RETURN_IF_ERROR(CheckChosenId(proto.session_id()));

@@ -33,25 +33,24 @@ bool IsLink(const Principal& caller) { return !caller.only_session.empty(); }
 
 absl::Status LinkHasEnded() {
   return absl::UnauthenticatedError(
-      "the follow link has expired or was taken back; ask who sent it for another one");
+      "the follow link has expired or was revoked; ask its sender for a new one");
 }
 
 }  // namespace
 
 absl::Status Access::CheckMethodAccess(const Principal& caller, std::string_view method) {
   if (IsLink(caller) && std::ranges::find(kOpenToLinks, method) == kOpenToLinks.end()) {
-    return absl::PermissionDeniedError(
-        "a follow link may follow its session and nothing else; log in for this");
+    return absl::PermissionDeniedError("a follow link can only watch its session; log in for this");
   }
   if (method == "CaseService.UploadCase" && !caller.anonymous() &&
       !caller.roles.contains("publisher")) {
     return absl::PermissionDeniedError(
-        "the token has not the role publisher, which cases are uploaded by; ask who runs the "
-        "server for it");
+        "uploading cases requires the role publisher, which the token lacks; ask the "
+        "server's operator");
   }
   if (method == "ExportService.UpdateExport" && !caller.anonymous() && !IsBridge(caller)) {
     return absl::PermissionDeniedError(
-        "the token has not the role bridge, which exports are answered by; take the export back "
+        "updating exports requires the role bridge, which the token lacks; withdraw the export "
         "instead");
   }
   return absl::OkStatus();
@@ -62,17 +61,17 @@ absl::Status Access::CheckProjectAccess(const Principal& caller, const std::stri
   TF_RETURN_IF_ERROR(CheckAccessName(project, "project"));
   if (caller.anonymous() || caller.projects.contains(project)) return absl::OkStatus();
   return absl::PermissionDeniedError(
-      "the token does not name this project; leave it out, or ask for a token that names it");
+      "the token does not include this project; remove it, or request a token that includes it");
 }
 
 absl::Status Access::Judge(Level level, Permission need, const absl::Status& not_found) {
   if (level == Level::kNothing) return not_found;
   if (need == Permission::kWrite && level < Level::kWrite) {
     return absl::PermissionDeniedError(
-        "it is shared with you to look at; ask its owner for the role planner");
+        "it is shared with you read-only; ask its owner for the role planner");
   }
   if (need == Permission::kOwner && level < Level::kOwner) {
-    return absl::PermissionDeniedError("it is another's, who shares it with you; ask its owner");
+    return absl::PermissionDeniedError("only the owner may do this; ask the owner");
   }
   return absl::OkStatus();
 }

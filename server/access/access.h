@@ -30,7 +30,7 @@ enum class Permission {
   kOwner,  // change it, delete it, share it
 };
 
-// Who may do what: the one place that decides it (docs/security.md, "Who may what").
+// Who may do what: the one place that decides it (docs/security.md, "Permissions").
 //
 // It answers from memory, by one look-up with principal and name, and never blocks. What a
 // principal may not look at answers NotFound, as what is not there, to the letter;

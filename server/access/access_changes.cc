@@ -20,12 +20,12 @@ namespace {
 
 void WarnUnlessErased(const absl::Status& status) {
   // In memory it is away; after a restart it belongs to a resource that is not there.
-  if (!status.ok()) spdlog::warn("rights of what was removed stay on the disk");
+  if (!status.ok()) spdlog::warn("access rights of a removed resource remain on disk");
 }
 
 absl::Status TooMany(absl::string_view what, int limit, absl::string_view option) {
   return absl::ResourceExhaustedError(absl::StrCat(
-      "it has ", limit, " ", what, ", as many as it may; take some back or raise ", option));
+      "it has ", limit, " ", what, ", which is the limit; revoke some or raise ", option));
 }
 
 }  // namespace
@@ -154,7 +154,7 @@ absl::Status AccessChanges::MayOwn(const Principal& caller, const std::string& r
     return access_.index_.FindCase(key) == nullptr ? NoCase(sha256) : absl::OkStatus();
   }
   return absl::InvalidArgumentError(
-      "not the name of a resource that can be shared; name a session, a prediction, a case or a "
+      "this resource cannot be shared; name a session, a prediction, a case or a "
       "project, \"sessions/{id}\"");
 }
 
@@ -192,7 +192,7 @@ void AccessChanges::Unshare(const Principal& caller, const std::string& resource
     MutexLock lock(access_.mutex_);
     status = MayOwn(caller, resource);
     if (status.ok() && !access_.table_.RoleOf(caller.name, resource, with).has_value()) {
-      status = absl::NotFoundError("no such share; ListShares tells which there are");
+      status = absl::NotFoundError("no such share; ListShares lists them");
     }
   }
   if (!status.ok()) {

@@ -20,7 +20,7 @@ absl::Status CheckAccessName(absl::string_view name, absl::string_view what) {
       !name.empty() && name.size() <= kMaxNameBytes &&
       std::all_of(name.begin(), name.end(), [](unsigned char c) { return absl::ascii_isprint(c); });
   if (is_name) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("the ", what, " is no name; it has 1 to ",
+  return absl::InvalidArgumentError(absl::StrCat("the ", what, " is not a valid name; use 1 to ",
                                                  kMaxNameBytes, " bytes of printable ASCII"));
 }
 

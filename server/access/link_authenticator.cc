@@ -52,7 +52,8 @@ absl::StatusOr<Authenticated> LinkAuthenticator::Authenticate(const Credentials&
   const absl::string_view token = LinkTokenOf(credentials);
   if (token.empty()) return others_->Authenticate(credentials);
   if (token.size() != kTokenBytes) {
-    return absl::UnauthenticatedError("the follow link is cut or changed; open it as it was sent");
+    return absl::UnauthenticatedError(
+        "the follow link is incomplete or changed; open it exactly as sent");
   }
   TF_ASSIGN_OR_RETURN(const FollowLinkRow link, access_->FindLink(DigestOfLinkToken(token)));
   return Authenticated{

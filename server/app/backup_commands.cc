@@ -18,7 +18,7 @@ namespace {
 
 absl::StatusOr<std::string> FolderToBackUp(const ServerOptions& options) {
   if (options.in_memory) {
-    return absl::InvalidArgumentError("with --in-memory nothing is kept: name a --data-dir");
+    return absl::InvalidArgumentError("with --in-memory nothing is stored: name a --data-dir");
   }
   if (options.cluster.enabled()) {
     return absl::InvalidArgumentError(
@@ -54,12 +54,12 @@ int Tell(const char* done, const std::string& folder,
 BackupCommands::BackupCommands(CLI::App& app, const ServerOptions* options) : options_(options) {
   app.fallthrough();
   backup_ =
-      app.add_subcommand("backup", "copy what the server keeps into a new folder, while it serves");
-  backup_->add_option("DIR", folder_, "a folder that is empty or not there yet")->type_name("");
+      app.add_subcommand("backup", "copy the server's data into a new folder, while it serves");
+  backup_->add_option("DIR", folder_, "an empty or new folder")->type_name("");
   verify_ = backup_->add_subcommand("verify", "read every byte of a backup and check it");
   verify_->add_option("DIR", folder_, "folder of a backup")->required()->type_name("");
-  restore_ = app.add_subcommand(
-      "restore", "copy a backup into the data folder, which is empty or not there yet");
+  restore_ = app.add_subcommand("restore",
+                                "copy a backup into the data folder, which must be empty or new");
   restore_->add_option("DIR", folder_, "folder of a backup")->required()->type_name("");
   backup_->callback([this] {
     if (folder_.empty()) throw CLI::RequiredError("DIR");

@@ -28,7 +28,7 @@
 namespace {
 
 constexpr char kDescription[] =
-    "Keeps soft-tissue sessions in memory and lends them over gRPC (package tissueform.v1).\n"
+    "Serves soft-tissue sessions over gRPC (package tissueform.v1).\n"
     "Prints `listening on HOST:PORT` on stdout when it is ready; logs go to stderr.\n"
     "SIGTERM or SIGINT: refuses new work, lets open calls finish, exit code 0.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";

@@ -25,7 +25,7 @@ absl::StatusOr<MigrationSummary> Migrate(const std::string& from, const ClusterO
   TF_ASSIGN_OR_RETURN(DataFolder folder, DataFolder::Open(from));
   TF_ASSIGN_OR_RETURN(const auto store, DurableStore::Open(std::move(folder)));
   for (const DamagedItem& item : store->damaged()) {
-    absl::FPrintF(stderr, "tissueform-server: damaged, and left behind: %s\n", item.what);
+    absl::FPrintF(stderr, "tissueform-server: damaged and not copied: %s\n", item.what);
   }
   return MigrateStore(store.get(), stores.get());
 }
@@ -33,20 +33,15 @@ absl::StatusOr<MigrationSummary> Migrate(const std::string& from, const ClusterO
 }  // namespace
 
 MigrateCommand::MigrateCommand(CLI::App& app) {
-  migrate_ = app.add_subcommand(
-      "migrate",
-      "carry what one server has kept, which must not run, over into the empty database of a "
-      "cluster; the folder stays as it is");
+  migrate_ = app.add_subcommand("migrate",
+                                "copy the data of one stopped server into the empty database of a "
+                                "cluster; the folder does not change");
   // Its own: those of the server exclude each other.
-  migrate_->add_option("--data-dir", folder_, "folder that is carried over")
-      ->required()
-      ->type_name("DIR");
-  migrate_->add_option("--store", to_.store, "database that it is carried into")
-      ->required()
-      ->type_name("URL");
+  migrate_->add_option("--data-dir", folder_, "data folder to copy")->required()->type_name("DIR");
+  migrate_->add_option("--store", to_.store, "target database")->required()->type_name("URL");
   migrate_
       ->add_option("--store-password-file", to_.password_file,
-                   "as the server's option of this name")
+                   "like the server's option of this name")
       ->type_name("FILE");
 }
 
@@ -58,7 +53,7 @@ std::optional<int> MigrateCommand::Run() const {
     return 1;
   }
   absl::PrintF(
-      "carried over from %s: %d sessions, %d meshes, %d predictions, %d cases, %d rights and "
+      "copied from %s: %d sessions, %d meshes, %d predictions, %d cases, %d rights and "
       "shares, %d exports\n",
       folder_, summary->sessions, summary->meshes, summary->predictions, summary->cases,
       summary->access_rows, summary->exports);

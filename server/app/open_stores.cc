@@ -30,7 +30,7 @@ absl::StatusOr<std::unique_ptr<Stores>> OpenFolder(const ServerOptions& options)
   for (const DamagedItem& item : store->damaged()) {
     spdlog::error(
         "damaged: {}: {}; {}", item.what, item.why,
-        item.set_aside.empty() ? "nothing of it is left" : "set aside as " + item.set_aside);
+        item.set_aside.empty() ? "nothing remains of it" : "set aside as " + item.set_aside);
   }
   return store;
 }
@@ -44,11 +44,11 @@ absl::StatusOr<std::unique_ptr<PostgresStores>> OpenPatiently(const ClusterOptio
     auto stores = PostgresStores::Open({.database = database});
     if (!absl::IsUnavailable(stores.status())) return stores;
     if (std::chrono::steady_clock::now() + kBetweenTries >= deadline) {
-      return absl::UnavailableError(absl::StrCat(stores.status().message(), "; waited for it for ",
+      return absl::UnavailableError(absl::StrCat(stores.status().message(), "; waited ",
                                                  cluster.start_patience.count() / 1000,
                                                  " s (--store)"));
     }
-    if (!told) spdlog::warn("the store's database is not there yet; waiting for it");
+    if (!told) spdlog::warn("the store's database is not reachable yet; waiting");
     std::this_thread::sleep_for(kBetweenTries);
   }
 }
@@ -64,8 +64,7 @@ absl::StatusOr<OpenedStores> OpenStores(const ServerOptions& options) {
   OpenedStores opened;
   if (options.cluster.enabled()) {
     if (options.in_memory || !options.data_dir.empty()) {
-      return absl::InvalidArgumentError(
-          "--store keeps everything in a database; leave --data-dir and --in-memory out");
+      return absl::InvalidArgumentError("--store excludes --data-dir and --in-memory");
     }
     TF_ASSIGN_OR_RETURN(std::unique_ptr<PostgresStores> stores, OpenPatiently(options.cluster));
     opened.shared = stores.get();

@@ -21,9 +21,10 @@ ServerOptions ServerOptions::Defaults() {
 }
 
 void AddServerOptions(CLI::App& app, ServerOptions* options) {
-  app.add_option("--host", options->host,
-                 "address to listen on; anything but loopback needs encryption and logins, or "
-                 "--insecure")
+  app.add_option(
+         "--host", options->host,
+         "address to listen on; other addresses than loopback need encryption and logins, or "
+         "--insecure")
       ->capture_default_str();
   app.add_option("--port", options->port, "port to listen on; 0 takes a free one")
       ->check(CLI::Range(0, 65535))
@@ -31,11 +32,11 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
   AddTlsOptions(app, &options->tls);
   options->in_memory = false;
   CLI::Option* in_memory = app.add_flag("--in-memory", options->in_memory,
-                                        "keep nothing: meshes and sessions end with the server");
+                                        "store nothing: meshes and sessions end with the server");
   CLI::Option* data_dir =
       app.add_option(
              "--data-dir", options->data_dir,
-             "folder of its own in which the server keeps what it has acknowledged, on a disk of "
+             "private folder for everything the server acknowledges, on a disk of "
              "this machine (default: $XDG_STATE_HOME/tissueform, or ~/.local/state/tissueform)")
           ->type_name("DIR")
           ->excludes(in_memory);
@@ -43,7 +44,7 @@ void AddServerOptions(CLI::App& app, ServerOptions* options) {
   AddTokenOptions(app, &options->tokens);
   AddNumberOptions(app, options);
   app.add_option("--log-level", options->log_level,
-                 "what is logged on stderr, without names or paths")
+                 "log level on stderr; names and paths are never logged")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
   AddTelemetryOptions(app, &options->telemetry);

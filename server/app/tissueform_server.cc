@@ -112,8 +112,8 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   }
   std::unique_ptr<TissueformServer> server(new TissueformServer(options, std::move(parts)));
   if (server->is_exposed()) {
-    spdlog::warn("INSECURE: {}, and strangers may reach it (--insecure)",
-                 options.tls.enabled() ? "nobody is asked to log in" : "calls are not encrypted");
+    spdlog::warn("INSECURE: {}, and the server is reachable over the network (--insecure)",
+                 options.tls.enabled() ? "logins are disabled" : "calls are not encrypted");
   }
   TF_RETURN_IF_ERROR(server->LoadIndex());
   server->housekeeping_.Start();
@@ -207,7 +207,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   });
   access_changes_.set_on_prediction_removed([this](const std::string& id) {
     // In memory they are gone; a restart finds no prediction of those that the disk has.
-    if (!exports_.RemoveOf(id).ok()) spdlog::warn("exports of what was removed stay on the disk");
+    if (!exports_.RemoveOf(id).ok()) spdlog::warn("exports of a removed prediction remain on disk");
   });
   access_.set_most_bytes(options.quotas.disk_bytes);
   registry_.set_most_of_owner(options.quotas.sessions);
@@ -255,7 +255,7 @@ absl::Status TissueformServer::ServeMetrics() {
                      [this] { return static_cast<double>(streams_.size()); });
   metrics_->AddGauge("tissueform_watches", "Watches open.", {},
                      [this] { return static_cast<double>(watches_.size()); });
-  metrics_->AddGauge("tissueform_exports_waiting", "Predictions on their way to the PACS.", {},
+  metrics_->AddGauge("tissueform_exports_waiting", "Exports to the PACS in progress.", {},
                      [this] { return static_cast<double>(exports_.CountWaiting()); });
   metrics_->AddGauge("tissueform_export_watches", "Watches of exports open.", {},
                      [this] { return static_cast<double>(export_watches_.size()); });
@@ -353,7 +353,7 @@ void TissueformServer::Reclaim(int64_t bytes) {
     registry_.RemoveIdle();
     meshes = catalog_.RemoveIdle(options_.limits.session_idle_ttl);
   }
-  if (meshes > 0) spdlog::info("{} meshes that nobody uses have left memory", meshes);
+  if (meshes > 0) spdlog::info("{} unused meshes were evicted from memory", meshes);
 }
 
 int64_t TissueformServer::FreeBytes() const {
@@ -389,7 +389,7 @@ void TissueformServer::Drain() {
   }
   export_watches_.NotifyDraining();
   if (!gate_.WaitUntilIdle(deadline)) {
-    spdlog::warn("draining: cancelling the calls that are still open");
+    spdlog::warn("draining: canceling open calls");
   }
   housekeeping_.Stop();
   listener_->Stop();

@@ -89,7 +89,7 @@ void ChangeFollower::Loop() {
   StoreChange change;
   while (Next(&change)) {
     if (Apply(change).ok()) continue;
-    spdlog::warn("what other servers have changed cannot be read; all is read when it can");
+    spdlog::warn("changes by other servers cannot be read; everything is read again later");
     const auto next = std::chrono::steady_clock::now() + kBeforeTryingAgain;
     MutexLock lock(mutex_);
     heard_.assign(1, {.kind = Kind::kMissed});

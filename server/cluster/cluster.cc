@@ -16,7 +16,7 @@ using Counter = std::atomic<int64_t>;
 
 void AddCalls(MetricsPage* page, const char* call, const char* outcome, const Counter& counter) {
   page->AddCounter("tissueform_lease_calls_total",
-                   "Calls to the cluster's database about who holds a session, by what became of "
+                   "Calls to the cluster's database about leases, by outcome "
                    "them.",
                    {{"call", call}, {"outcome", outcome}},
                    [&counter] { return static_cast<double>(counter); });
@@ -85,17 +85,17 @@ void Cluster::AddTo(MetricsPage* page) {
   page->AddGauge("tissueform_sessions_held", "Sessions that this server holds by a lease.", {},
                  [this] { return static_cast<double>(node_.held()); });
   page->AddCounter("tissueform_sessions_lost_total",
-                   "Sessions whose lease has ended without having been given back.", {},
+                   "Sessions whose lease expired without being returned.", {},
                    [this] { return static_cast<double>(node_.lost()); });
   page->AddGauge("tissueform_lease_renewal_age_seconds",
-                 "Since leases were last renewed; above 9 no session is answered.", {},
+                 "Seconds since the last lease renewal; above 9 the node answers nothing.", {},
                  [&leases] { return leases.SinceRenewal().count(); });
-  page->AddGauge("tissueform_other_nodes", "Other servers that use the database now.", {},
+  page->AddGauge("tissueform_other_nodes", "Other active servers of the cluster.", {},
                  [this] { return static_cast<double>(node_.nodes().CountOthers()); });
   page->AddGauge("tissueform_node_name_taken", "1 while another server has this one's name.", {},
                  [this] { return node_.nodes().IsNameTaken() ? 1.0 : 0.0; });
   page->AddCounter("tissueform_row_lookups_total",
-                   "Rows that were looked for since nobody here knew what a call named.", {},
+                   "Database lookups of names that this node did not know.", {},
                    [this] { return static_cast<double>(lookups_->lookups()); });
 }
 

@@ -44,7 +44,7 @@ absl::StatusOr<int64_t> ClusterNode::Acquire(const std::string& id) {
 
 void ClusterNode::Release(const std::string& id) {
   // What is not released runs out.
-  if (!keeper_.Release(id).ok()) spdlog::info("a session is not given away: its lease runs out");
+  if (!keeper_.Release(id).ok()) spdlog::info("a session is not handed over; its lease expires");
 }
 
 absl::Status ClusterNode::NamingRoom(const absl::Status& refusal) {

@@ -30,18 +30,18 @@ void AddClusterOptions(CLI::App& app, ClusterOptions* options, CLI::Option* data
                        CLI::Option* in_memory) {
   CLI::Option* store =
       app.add_option("--store", options->store,
-                     "PostgreSQL database that several servers share, postgresql://user@host:port/"
-                     "name, in place of a data folder: this server is then a node of a cluster")
+                     "shared PostgreSQL database of several servers, postgresql://user@host:port/"
+                     "name, instead of a data folder: this server becomes a node of a cluster")
           ->type_name("URL")
           ->excludes(data_dir)
           ->excludes(in_memory);
   app.add_option("--store-password-file", options->password_file,
-                 "file with the database's password, which others must not be able to read "
+                 "file with the database's password, readable by its owner only "
                  "(default: the environment's TISSUEFORM_STORE_PASSWORD)")
       ->type_name("FILE")
       ->needs(store);
   app.add_option("--node-name", options->node_name,
-                 "what this server is called in its cluster: clients and proxies name it so "
+                 "name of this server in its cluster, used by clients and proxies "
                  "(default: the machine's name and the port)")
       ->type_name("NAME")
       ->needs(store)
@@ -53,7 +53,7 @@ absl::Status CheckNodeName(const std::string& name) {
       std::all_of(name.begin(), name.end(), MayStandInName)) {
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError(absl::StrCat("not a name of a node: give it 1 to ",
+  return absl::InvalidArgumentError(absl::StrCat("not a valid node name: use 1 to ",
                                                  kMaxNodeNameBytes,
                                                  " letters, digits, \"-\", \"_\", \".\" or \":\""));
 }

@@ -51,7 +51,7 @@ void NodeTable::SetDraining() {
     MutexLock lock(mutex_);
     draining_ = true;
   }
-  if (!Exchange().ok()) spdlog::warn("other servers are not told that this one drains");
+  if (!Exchange().ok()) spdlog::warn("other servers do not know that this one drains");
 }
 
 std::string NodeTable::WithRoom(int64_t bytes) {

@@ -52,7 +52,7 @@ absl::StatusOr<bool> ReadThroughLoader::Begin(const Key& key) {
   }
   if (reading_ >= kMaxAtOnce || now < silent_until_) {
     return absl::UnavailableError(
-        "what is named is not known here, and the store cannot be asked now; try again");
+        "the resource is unknown here, and the database does not answer; try again");
   }
   if (missing_.size() >= kMaxRemembered) missing_.clear();
   ++reading_;

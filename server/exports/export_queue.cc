@@ -22,8 +22,8 @@ constexpr int kCountedDigits = 12;
 
 absl::Status TooManyExports(absl::string_view what, int limit, absl::string_view option) {
   return WithReason(
-      absl::ResourceExhaustedError(absl::StrCat(what, " ", limit, " exports, as many as it may; ",
-                                                "wait, take some back or raise ", option)),
+      absl::ResourceExhaustedError(absl::StrCat(what, " ", limit, " exports, which is the limit; ",
+                                                "wait, withdraw some or raise ", option)),
       ErrorReason::kTooManyExports, {{"limit", absl::StrCat(limit)}});
 }
 
@@ -212,7 +212,7 @@ absl::StatusOr<ExportRecord> ExportQueue::Update(const std::string& id, const Ch
   if (!change.etag.empty() && change.etag != EtagOf(record)) return StaleExport(id);
   if (!MayFollow(record.state, change.state)) {
     return absl::InvalidArgumentError(
-        "the state does not follow the one that it has; it goes from waiting over confirmation and "
+        "invalid change of state; states go from waiting over confirmation and "
         "storing, which may go back to confirmation, to stored or failed, and stays there");
   }
   record.state = change.state;

@@ -33,11 +33,11 @@ std::string SerializeExport(const ExportRecord& record) {
 absl::StatusOr<ExportRecord> ParseExport(absl::string_view bytes) {
   store::v1::ExportRecord proto;
   if (!proto.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
-    return Damaged("an export", "its bytes are none");
+    return Damaged("an export", "it is unreadable");
   }
   if (proto.state() < static_cast<int32_t>(ExportState::kWaiting) ||
       proto.state() > static_cast<int32_t>(ExportState::kFailed)) {
-    return Damaged("an export", "its state is none");
+    return Damaged("an export", "its state is missing");
   }
   return ExportRecord{.id = proto.id(),
                       .prediction = proto.prediction(),
@@ -61,9 +61,9 @@ bool MayFollow(ExportState before, ExportState after) {
 }
 
 absl::Status StaleExport(absl::string_view id) {
-  return WithReason(absl::AbortedError(absl::StrCat(
-                        "export \"", id, "\" has changed in the meantime; get it and try again")),
-                    ErrorReason::kStaleEtag);
+  return WithReason(
+      absl::AbortedError(absl::StrCat("export \"", id, "\" has changed; get it and try again")),
+      ErrorReason::kStaleEtag);
 }
 
 absl::Status NoExport(absl::string_view id) {

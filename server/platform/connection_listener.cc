@@ -215,9 +215,8 @@ bool ConnectionListener::TurnOneAway(int listener_fd) {
 
 void ConnectionListener::TellOfRefusals() {
   if (refused_ == 0) return;
-  spdlog::warn(
-      "turned {} connections away; {} are open, as many as may be, or as many of one address",
-      refused_, table_.size());
+  spdlog::warn("refused {} connections; {} are open, the limit in all or per address", refused_,
+               table_.size());
   refused_ = 0;
 }
 

@@ -156,9 +156,9 @@ absl::Status MetricsPage::Serve(int port) {
     server->exposer().RegisterCollectable(families_);
     server_ = std::move(server);
   } catch (const std::exception& error) {
-    return absl::UnavailableError(
-        absl::StrCat("metrics: port ", port, " of 127.0.0.1 cannot be listened on (", error.what(),
-                     "); name another --metrics-port, or 0"));
+    return absl::UnavailableError(absl::StrCat("metrics: port ", port,
+                                               " of 127.0.0.1 is not available (", error.what(),
+                                               "); name another --metrics-port, or 0"));
   }
   return absl::OkStatus();
 }

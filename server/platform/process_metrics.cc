@@ -56,8 +56,8 @@ void AddProcessMetrics(const std::string& prefix, const std::string& version, Me
   page->AddGauge("process_resident_memory_bytes", "Memory of the process.", {}, ResidentBytes);
   page->AddCounter("process_cpu_seconds_total", "Processor time that the process has taken.", {},
                    ProcessorSeconds);
-  page->AddGauge("process_open_fds", "Descriptors that the process has open.", {}, OpenDescriptors);
-  page->AddGauge("process_max_fds", "Descriptors that the process may open.", {}, MaxDescriptors);
+  page->AddGauge("process_open_fds", "Open descriptors of the process.", {}, OpenDescriptors);
+  page->AddGauge("process_max_fds", "Descriptor limit of the process.", {}, MaxDescriptors);
   page->AddGauge("process_start_time_seconds", "When the process made this page, in Unix time.", {},
                  [start = static_cast<double>(std::time(nullptr))] { return start; });
 }

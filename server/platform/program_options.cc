@@ -46,7 +46,7 @@ std::string WrongName(const std::string& name, const std::string& told) {
       name.size() <= kLongestName && std::all_of(name.begin(), name.end(), [](unsigned char c) {
         return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-' || c == '_';
       });
-  return may_be_a_name ? told : "it is no file of options: lines are `name = value`";
+  return may_be_a_name ? told : "it is not a file of options: lines are `name = value`";
 }
 
 // CLI11's own reader of files, which lets a file win over the environment, passes over what it does
@@ -76,7 +76,7 @@ class ConfigFile final : public CLI::ConfigBase {
     if (!item.parents.empty()) {
       const std::string& section = item.parents.front();
       throw CLI::ConfigError(WrongName(
-          section, absl::StrCat("section [", section, "]: there are none; leave it out")));
+          section, absl::StrCat("section [", section, "]: sections are not supported; remove it")));
     }
     const CLI::Option* option = app_->get_option_no_throw("--" + item.name);
     if (option == nullptr || !option->get_configurable()) {
@@ -134,7 +134,8 @@ std::string Line(const CLI::Option& option) {
   for (const std::string& value : values) {
     const std::optional<std::string> text = Quoted(Hide(value));
     if (!text.has_value()) {
-      return absl::StrCat("# ", name, " has a character that no file can hold: set it otherwise\n");
+      return absl::StrCat("# ", name,
+                          " has a character that a file cannot hold: set it on the command line\n");
     }
     quoted.push_back(*text);
   }
@@ -158,13 +159,12 @@ void AddConfiguration(CLI::App& app, const std::string& environment_prefix) {
   const std::string variable = VariableOf(environment_prefix, "config");
   const std::string file = Environment(variable);
   app.set_config("--config", file,
-                 absl::StrCat("file with any of these options, as `name = value` lines (Env:",
-                              variable, ")"),
+                 absl::StrCat("file with options, as `name = value` lines (Env:", variable, ")"),
                  !file.empty())
       ->type_name("FILE")
       ->configurable(false);
   app.config_formatter(std::make_shared<ConfigFile>(&app, environment_prefix));
-  const std::string help = "print every option with its value, as --config reads it, and end";
+  const std::string help = "print all options with their values, in the form of --config, and exit";
   app.add_flag("--print-config", help)->configurable(false);
 }
 

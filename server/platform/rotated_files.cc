@@ -29,7 +29,7 @@ constexpr std::chrono::hours kTellInterval{24};
 
 absl::Status CannotKeep() {
   return absl::InternalError(
-      absl::StrCat("cannot keep certificates in memory: ", std::strerror(errno)));
+      absl::StrCat("cannot hold certificates in memory: ", std::strerror(errno)));
 }
 
 bool WriteAll(int fd, const std::string& content) {
@@ -82,7 +82,7 @@ absl::Status PrivateFile::Replace(const std::string& content) {
 absl::StatusOr<std::unique_ptr<RotatedFiles>> RotatedFiles::Load(const Paths& paths) {
   using grpc::experimental::FileWatcherCertificateProvider;
   if (paths.certificate.empty() != paths.key.empty()) {
-    return absl::InvalidArgumentError("a certificate needs its key, and a key its certificate");
+    return absl::InvalidArgumentError("give both certificate and key");
   }
   auto files = absl::WrapUnique(new RotatedFiles(paths));
   TF_ASSIGN_OR_RETURN(const Contents contents, files->Read());
@@ -165,7 +165,7 @@ void RotatedFiles::TellOfExpiry() {
   const auto left = expiry() - now;
   if (identity_ == nullptr || left > kSoon || now - told_of_expiry_ < kTellInterval) return;
   told_of_expiry_ = now;
-  spdlog::warn("the certificate ends in {} h; renew it by rewriting its file",
+  spdlog::warn("the certificate expires in {} h; renew it by rewriting its file",
                std::chrono::duration_cast<std::chrono::hours>(left).count());
 }
 
@@ -180,7 +180,7 @@ void RotatedFiles::Watch() {
       // Twice the same: not just between the writing of two files that belong together.
       if (!status.ok() && status == last && told != status.message()) {
         told = std::string(status.message());
-        spdlog::error("ALARM: certificates: {}; the ones before stay in use", told);
+        spdlog::error("ALARM: certificates: {}; the previous ones stay in use", told);
         alarm_ = true;
       }
       if (status.ok()) {

@@ -11,16 +11,16 @@ namespace tissueform {
 void AddTlsOptions(CLI::App& app, TlsOptions* options) {
   CLI::Option* certificate =
       app.add_option("--tls-cert", options->certificate,
-                     "certificate chain of the server in PEM, its own first: calls are encrypted. "
-                     "Renewed by rewriting the file")
+                     "certificate chain of the server in PEM, its own first; enables encryption. "
+                     "Rewrite the file to renew it")
           ->type_name("FILE");
-  CLI::Option* key = app.add_option("--tls-key", options->key,
-                                    "its key in PEM, which others must not be able to read")
-                         ->type_name("FILE")
-                         ->needs(certificate);
+  CLI::Option* key =
+      app.add_option("--tls-key", options->key, "its key in PEM, not readable by other users")
+          ->type_name("FILE")
+          ->needs(certificate);
   certificate->needs(key);
   CLI::Option* client_ca = app.add_option("--tls-client-ca", options->client_ca,
-                                          "authorities in PEM whose certificates clients must show")
+                                          "authorities of client certificates, in PEM")
                                ->type_name("FILE")
                                ->needs(certificate);
   app.add_option_function<std::string>(
@@ -28,17 +28,17 @@ void AddTlsOptions(CLI::App& app, TlsOptions* options) {
          [options](const std::string& word) {
            options->client_certificate_required = word == "required";
          },
-         "whether a client must show a certificate, or may, of these authorities")
+         "whether clients must or may present a certificate of these authorities")
       ->check(CLI::IsMember({"required", "optional"}))
       ->default_str("required")
       ->needs(client_ca);
   app.add_option("--gateway-name", options->gateway_name,
-                 "name in the certificate of the gateway: only it may state whom it speaks for "
+                 "name in the certificate of the gateway, which may state its clients' addresses "
                  "(x-tissueform-client-address)")
       ->type_name("NAME")
       ->needs(client_ca);
   app.add_flag("--insecure", options->insecure,
-               "off loopback serve without encryption or logins: to whoever reaches the port");
+               "serve without encryption or logins to anyone who reaches the port");
 }
 
 absl::Status CheckExposure(const std::string& host, const TlsOptions& options, bool has_tokens) {
@@ -56,9 +56,9 @@ absl::Status CheckExposure(const std::string& host, const TlsOptions& options, b
                                   ? "encryption (--tls-cert, --tls-key)"
                                   : "encryption and without logins (--tls-cert, --tls-key, "
                                     "--token-issuer, --token-keys)";
-  return absl::FailedPreconditionError(absl::StrCat(
-      "--host ", host, " would be reached over the network without ", missing,
-      "; give them, listen on 127.0.0.1, or say --insecure if nobody but you is there"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("--host ", host, " would be reached over the network without ", missing,
+                   "; add them, listen on 127.0.0.1, or give --insecure on an isolated network"));
 }
 
 }  // namespace tissueform

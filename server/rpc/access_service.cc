@@ -42,7 +42,7 @@ absl::StatusOr<ShareRow> ToShare(const v1::Share& proto) {
       return share;
     default:
       return absl::InvalidArgumentError(
-          "role is none of a share; send SHARE_ROLE_VIEWER or SHARE_ROLE_PLANNER");
+          "invalid share role; send SHARE_ROLE_VIEWER or SHARE_ROLE_PLANNER");
   }
 }
 
@@ -82,7 +82,7 @@ absl::StatusOr<std::string> AskedPrincipal(const Principal& caller, const std::s
   if (asked.empty() || asked == caller.name) return caller.name;
   if (!caller.anonymous() && !caller.roles.contains("admin")) {
     return absl::PermissionDeniedError(
-        "the token has not the role admin; leave the principal out to see your own usage");
+        "usage of others requires the role admin; leave the principal out to see your own");
   }
   return asked;
 }

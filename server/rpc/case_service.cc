@@ -42,7 +42,7 @@ absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, const Acce
   const int64_t offset = request.read_offset();
   if (offset < 0 || offset > total) {
     return absl::InvalidArgumentError(
-        absl::StrCat("read_offset is ", offset, "; the case has ", total, " bytes"));
+        absl::StrCat("read_offset is ", offset, "; the size of the case is ", total, " bytes"));
   }
   const int64_t rest = total - offset;
   const int64_t size = request.read_limit() == 0 ? rest : std::min(rest, request.read_limit());

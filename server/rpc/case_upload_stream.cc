@@ -27,7 +27,7 @@ v1::Case ToProto(const CaseRecord& record) {
 
 absl::Status CaseUploadStream::EndedEarly() const {
   return absl::InvalidArgumentError(
-      "the upload ended without a chunk that has finish_write; nothing of it is kept: send the "
+      "the upload ended without finish_write and was discarded; send the "
       "case again");
 }
 
@@ -47,7 +47,7 @@ absl::StatusOr<CaseUploadStream::After> CaseUploadStream::Take(
   const v1::CaseChunk& chunk = request.chunk();
   if (chunk.data().size() > static_cast<size_t>(limits_.max_chunk_bytes)) {
     return absl::InvalidArgumentError(absl::StrCat("the chunk at ", chunk.write_offset(), " has ",
-                                                   chunk.data().size(), " bytes; it may have ",
+                                                   chunk.data().size(), " bytes; the limit is ",
                                                    limits_.max_chunk_bytes));
   }
   TF_RETURN_IF_ERROR(writer_->Write(chunk.write_offset(), chunk.data()));
@@ -99,10 +99,10 @@ absl::Status CaseUploadStream::CheckHeader(const v1::CaseHeader& header) const {
 absl::Status CaseUploadStream::TakePlace() {
   has_place_ = true;
   if (under_way_->fetch_add(1) < limits_.max_case_uploads) return absl::OkStatus();
-  return absl::ResourceExhaustedError(
-      absl::StrCat(limits_.max_case_uploads,
-                   " cases are being sent, which is the limit (max_case_uploads); try again in a "
-                   "moment"));
+  return absl::ResourceExhaustedError(absl::StrCat(
+      limits_.max_case_uploads,
+      " cases are being uploaded, which is the limit (max_case_uploads); try again in a "
+      "moment"));
 }
 
 absl::Status CaseUploadStream::Check() {

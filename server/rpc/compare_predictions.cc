@@ -102,15 +102,14 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
       return absl::OkStatus();
     }
     if (!request_.has_other_prediction()) {
-      return absl::InvalidArgumentError(
-          "nothing to compare with; set other_prediction or other_model");
+      return absl::InvalidArgumentError("set other_prediction or other_model");
     }
     TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request_.other_prediction()));
     TF_RETURN_IF_ERROR(access_.CheckPredictionAccess(scope().principal(), id, Permission::kRead));
     TF_ASSIGN_OR_RETURN(ReadPrediction other, Read(id, store_));
     if (other.prediction.mesh() != one_.prediction.mesh()) {
       return NotComparable(
-          "the predictions are of different meshes, whose vertices do not correspond; compare two "
+          "the predictions have different meshes, whose vertices do not correspond; compare two "
           "of one mesh");
     }
     told.set_other_prediction(other.prediction.name());
@@ -147,9 +146,9 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
       return absl::OkStatus();
     }
     return NotComparable(
-        "the session has another mesh, other regions or another stiffness than when the prediction "
-        "was made; "
-        "make the prediction again");
+        "the session's mesh, regions or stiffness changed since the prediction "
+        "was created; "
+        "create the prediction again");
   }
 
   // Sorting a million distances takes its time.

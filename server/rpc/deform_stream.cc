@@ -62,7 +62,7 @@ void DeformStreamReactor::OnReadDone(bool ok) {
     if (flow_.has_value()) {
       flow_->CloseSending();
     } else {
-      End(absl::InvalidArgumentError("the stream ended before its configuration; send that first"));
+      End(absl::InvalidArgumentError("the stream ended before its configuration; send it first"));
     }
   } else if (!outcome_.has_value()) {
     const bool configures = !flow_.has_value();
@@ -88,7 +88,7 @@ void DeformStreamReactor::OnCancel() {
   *cancelled_ = true;
   registry_->CancelWait(cancelled_);
   MutexLock lock(mutex_);
-  End(absl::CancelledError("the client has cancelled the stream"));
+  End(absl::CancelledError("the client canceled the stream"));
   Advance();
 }
 
@@ -122,7 +122,7 @@ void DeformStreamReactor::EndUnlessConfigured() {
   // A silent stream holds one of the places that others wait for.
   End(WithReason(absl::DeadlineExceededError(absl::StrCat(
                      "no configuration came within ", limits_.configuration_deadline.count(),
-                     " ms of the opening of the stream; send it as the first message")),
+                     " ms after the stream opened; send it as the first message")),
                  ErrorReason::kNoConfigurationInTime));
   Advance();
 }
@@ -233,11 +233,11 @@ absl::Status DeformStreamReactor::Take() {
     case v1::DeformRequest::kToken:
       return scope_.Renew(request_.token());
     case v1::DeformRequest::kConfiguration:
-      return absl::InvalidArgumentError("a second configuration; open another stream for it");
+      return absl::InvalidArgumentError("a second configuration; open a new stream for it");
     case v1::DeformRequest::MESSAGE_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError("a message without content; send a pose or an ack");
+  return absl::InvalidArgumentError("an empty message; send a pose or an ack");
 }
 
 absl::Status DeformStreamReactor::TakeConfiguration() {

@@ -15,7 +15,7 @@ absl::Status DeformStreams::Add(DeformStreamReactor* stream) {
   if (streams_.size() >= static_cast<size_t>(max_streams_)) {
     return WithReason(absl::ResourceExhaustedError(absl::StrCat(
                           "the server has ", max_streams_,
-                          " open streams, as many as it may; close one or raise --max-streams")),
+                          " open streams, which is the limit; close one or raise --max-streams")),
                       ErrorReason::kTooManyStreams, {{"limit", absl::StrCat(max_streams_)}});
   }
   streams_.insert(stream);

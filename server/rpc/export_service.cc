@@ -41,7 +41,7 @@ absl::StatusOr<ExportState> ToState(v1::ExportState state) {
   if (state >= v1::EXPORT_STATE_WAITING && state <= v1::EXPORT_STATE_FAILED) {
     return static_cast<ExportState>(state);
   }
-  return absl::InvalidArgumentError("state is none; say what the bridge has done");
+  return absl::InvalidArgumentError("state is missing");
 }
 
 }  // namespace
@@ -119,8 +119,8 @@ absl::StatusOr<ExportRecord> ExportService::Wanted(CallScope* scope,
                                                    const v1::CreateExportRequest& request) const {
   const size_t bytes = request.request_id().size();
   if (bytes > static_cast<size_t>(limits_.max_request_id_bytes)) {
-    return absl::InvalidArgumentError(absl::StrCat("request_id has ", bytes, " bytes; it may have ",
-                                                   limits_.max_request_id_bytes));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "request_id has ", bytes, " bytes; the limit is ", limits_.max_request_id_bytes));
   }
   TF_RETURN_IF_ERROR(CheckMeasures(request.measures()));
   TF_ASSIGN_OR_RETURN(const std::string id,
@@ -128,7 +128,7 @@ absl::StatusOr<ExportRecord> ExportService::Wanted(CallScope* scope,
   TF_ASSIGN_OR_RETURN(const PredictionRecord prediction, predictions_->Get(id));
   if (prediction.case_sha256.empty()) {
     return absl::FailedPreconditionError(
-        "the prediction is of no case, so nobody knows whose it is; make it in a case");
+        "the prediction has no case, so its patient is unknown; create it in a case");
   }
   return ExportRecord{
       .prediction = id,
@@ -183,7 +183,7 @@ absl::Status ExportService::Update(CallScope* scope, const v1::UpdateExportReque
   TF_ASSIGN_OR_RETURN(const ExportState state, ToState(request.state()));
   TF_RETURN_IF_ERROR(CheckExportDetail(request.detail()));
   if (request.stored_objects() < 0) {
-    return absl::InvalidArgumentError("stored_objects is below 0; say how many are in the PACS");
+    return absl::InvalidArgumentError("stored_objects must be at least 0");
   }
   TF_ASSIGN_OR_RETURN(const ExportRecord record, Allowed(scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const ExportRecord changed,

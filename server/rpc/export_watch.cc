@@ -45,8 +45,8 @@ absl::Status ExportWatches::Add(ExportWatcher* watcher) {
   }
   if (watchers_.size() >= static_cast<size_t>(most_)) {
     return WithReason(absl::ResourceExhaustedError(
-                          absl::StrCat("the server has ", most_, " watches of exports, as many as ",
-                                       "it may; close one or raise --max-export-watches")),
+                          absl::StrCat("the server has ", most_, " watches of exports, which is ",
+                                       "the limit; close one or raise --max-export-watches")),
                       ErrorReason::kTooManyWatches, {{"limit", absl::StrCat(most_)}});
   }
   watchers_.insert(watcher);
@@ -116,13 +116,13 @@ void ExportWatch::OnSendInitialMetadataDone(bool ok) {
 void ExportWatch::OnWriteDone(bool ok) {
   MutexLock lock(mutex_);
   writing_ = false;
-  if (!ok) End(absl::CancelledError("the client is gone, or took no message in time"));
+  if (!ok) End(absl::CancelledError("the client is gone, or read no message in time"));
   Advance();
 }
 
 void ExportWatch::OnCancel() {
   MutexLock lock(mutex_);
-  End(absl::CancelledError("the client has ended the watch"));
+  End(absl::CancelledError("the client ended the watch"));
   Advance();
 }
 

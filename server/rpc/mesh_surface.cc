@@ -32,7 +32,7 @@ absl::StatusOr<std::vector<const CellArray*>> FindSurfaceArrays(
     const StoredMesh& mesh, const google::protobuf::RepeatedPtrField<std::string>& names) {
   if (names.size() > kMaxSurfaceArrays) {
     return absl::InvalidArgumentError(absl::StrCat("cell_arrays names ", names.size(),
-                                                   " arrays; it may name ", kMaxSurfaceArrays));
+                                                   " arrays; the limit is ", kMaxSurfaceArrays));
   }
   std::vector<const CellArray*> arrays;
   for (const std::string& name : names) {
@@ -40,7 +40,7 @@ absl::StatusOr<std::vector<const CellArray*>> FindSurfaceArrays(
     if (arrays.back() != nullptr) continue;
     return absl::InvalidArgumentError(absl::StrCat("cell_arrays[", arrays.size() - 1,
                                                    "]: the mesh has no array of this name; GetMesh "
-                                                   "tells those that it has"));
+                                                   "lists them"));
   }
   return arrays;
 }

@@ -15,17 +15,17 @@
 namespace tissueform {
 
 absl::Status MeshUploadStream::EndedEarly() const {
-  return absl::InvalidArgumentError(absl::StrCat(
-      "the upload ended after ", upload_ == nullptr ? 0 : upload_->received_bytes(),
-      " bytes without a chunk that has finish_write; they are kept for a while: go on there"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("the upload ended after ", upload_ == nullptr ? 0 : upload_->received_bytes(),
+                   " bytes without finish_write; they are stored for a while: continue there"));
 }
 
 absl::Status MeshUploadStream::WasSilent() const {
-  return WithReason(absl::DeadlineExceededError(
-                        absl::StrCat("no chunk came for ", silence().count(),
-                                     " ms; ask QueryUpload how much of the mesh is there, and go "
-                                     "on")),
-                    ErrorReason::kUploadSilent);
+  return WithReason(
+      absl::DeadlineExceededError(absl::StrCat("no chunk came for ", silence().count(),
+                                               " ms; call QueryUpload and continue "
+                                               "on")),
+      ErrorReason::kUploadSilent);
 }
 
 absl::StatusOr<MeshUploadStream::After> MeshUploadStream::Take(

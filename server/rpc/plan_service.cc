@@ -49,8 +49,7 @@ absl::StatusOr<std::vector<HandlePose>> StartOf(const v1::FitRequest& request,
   if (request.poses().empty()) return std::vector<HandlePose>(constraints.handles().size());
   TF_ASSIGN_OR_RETURN(std::vector<HandlePose> poses, ToPoses(request.poses(), constraints));
   if (std::any_of(poses.begin(), poses.end(), [](const HandlePose& p) { return p.scale != 1; })) {
-    return absl::InvalidArgumentError(
-        "a pose has a scale other than 1; a fit moves bone as it is, so leave scales out");
+    return absl::InvalidArgumentError("a pose has a scale other than 1; leave scales out");
   }
   return poses;
 }
@@ -98,7 +97,7 @@ class FitCall : public grpc::ServerUnaryReactor {
     TF_ASSIGN_OR_RETURN(model_, ToModel(request_.model(), session_->model()));
     if (!HasPreparedAnswers(model_, session_->gradient_field())) {
       return absl::InvalidArgumentError(
-          "the model has no prepared answers to fit with; choose linear_elastic, neo_hookean, or "
+          "the model has no prepared answers; choose linear_elastic, neo_hookean, or "
           "gradient_field with propagated rotations and cotangent guidance");
     }
     TF_ASSIGN_OR_RETURN(const std::vector<HandlePose> start,
@@ -130,9 +129,8 @@ class FitCall : public grpc::ServerUnaryReactor {
     TF_RETURN_IF_ERROR(cancellation_.Check());
     const std::shared_ptr<const SharedResponse> answers = claim_->Get();
     if (answers == nullptr) {
-      return session_->evicted()
-                 ? absl::UnavailableError("the session left memory meanwhile; ask again")
-                 : absl::NotFoundError("the session was deleted meanwhile; create it again");
+      return session_->evicted() ? absl::UnavailableError("the session was evicted; try again")
+                                 : absl::NotFoundError("the session was deleted; create it again");
     }
     SessionModel model(session_.get(), model_);
     TF_ASSIGN_OR_RETURN(

@@ -99,7 +99,7 @@ absl::StatusOr<KeptPrediction> FromRecord(const PredictionRecord& record) {
   store::v1::PredictionMetadata metadata;
   if (!metadata.ParseFromString(record.metadata)) {
     return absl::DataLossError(
-        absl::StrCat("prediction \"", record.id, "\" is damaged; make it again"));
+        absl::StrCat("prediction \"", record.id, "\" is damaged; create it again"));
   }
   KeptPrediction kept;
   kept.prediction = std::move(*metadata.mutable_prediction());

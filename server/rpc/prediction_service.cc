@@ -73,7 +73,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
     const size_t bytes = request_.request_id().size();
     if (bytes > static_cast<size_t>(limits.max_request_id_bytes)) {
       return absl::InvalidArgumentError(absl::StrCat(
-          "request_id has ", bytes, " bytes; it may have ", limits.max_request_id_bytes));
+          "request_id has ", bytes, " bytes; the limit is ", limits.max_request_id_bytes));
     }
     TF_ASSIGN_OR_RETURN(notes_, NotesOf(request_, limits.max_title_bytes));
     return ParseSessionName(request_.session()).status();
@@ -148,7 +148,8 @@ absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request, co
   const auto size = static_cast<int64_t>(positions.size());
   if (request.read_offset() < 0 || request.read_offset() > size) {
     return absl::InvalidArgumentError(absl::StrCat("read_offset is ", request.read_offset(),
-                                                   "; the positions have ", size, " bytes"));
+                                                   "; the size of the positions is ", size,
+                                                   " bytes"));
   }
   return positions;
 }

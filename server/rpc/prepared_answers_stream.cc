@@ -52,8 +52,7 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
       TF_ASSIGN_OR_RETURN(const std::string id,
                           AllowedSession(access, &scope(), request_.session(), Permission::kWrite));
       if (!request_.has_prepared()) {
-        return absl::InvalidArgumentError(
-            "`prepared` is left out; set it as for the stream whose frames are to be evaluated");
+        return absl::InvalidArgumentError("`prepared` is missing; set it as for the stream");
       }
       TF_ASSIGN_OR_RETURN(wanted_, ReadStreamRequest(ConfigurationOf(request_), limits_));
       registry_->Open(id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
@@ -92,7 +91,7 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
         const std::shared_ptr<PreparedAnswersRef> claim,
         configuration->session->PrepareResponse(*configuration->response, cancellation_));
     const std::shared_ptr<const SharedResponse> shared = claim->Get();
-    if (shared == nullptr) return absl::NotFoundError("the session was deleted meanwhile");
+    if (shared == nullptr) return absl::NotFoundError("the session was deleted");
     TF_RETURN_IF_ERROR(Write(*shared));
     TF_RETURN_IF_ERROR(cancellation_.Check());
     Send([this](v1::GetPreparedAnswersResponse* message) { return NextMessage(message); });
@@ -109,11 +108,11 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
     if (size > most) {
       return absl::ResourceExhaustedError(absl::StrCat("the prepared answers have ", size,
                                                        " bytes; the server sends at most ", most,
-                                                       ": ask for fewer vertices"));
+                                                       ": request fewer vertices"));
     }
     if (request_.read_offset() < 0 || request_.read_offset() > size) {
       return absl::InvalidArgumentError(absl::StrCat("read_offset is ", request_.read_offset(),
-                                                     "; the prepared answers have ", size,
+                                                     "; the size of the prepared answers is ", size,
                                                      " bytes"));
     }
     offset_ = static_cast<size_t>(request_.read_offset());

@@ -133,7 +133,7 @@ absl::StatusOr<PageRequest> ReadPageRequest(int32_t page_size, const std::string
   }
   if (page_token.size() > kMaxPageTokenBytes) {
     return absl::InvalidArgumentError(
-        "page_token is none of this server's; take next_page_token of the page before");
+        "invalid page_token; use next_page_token of the previous page");
   }
   return PageRequest{.size = page_size == 0 ? kPageSize : std::min(page_size, kMaxPageSize),
                      .after = page_token};

@@ -62,8 +62,7 @@ absl::Status SessionPreparation::Begin(const Principal& caller) {
     case v1::PrepareSessionRequest::WHAT_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError(
-      "the request says nothing that this server knows; send create, update or open");
+  return absl::InvalidArgumentError("the request is empty; send create, update or open");
 }
 
 absl::Status SessionPreparation::BeginCreation(const Principal& caller) {
@@ -209,7 +208,7 @@ void SessionPreparation::Finish(absl::StatusOr<v1::Session> result,
 void SessionPreparation::Cancel() {
   *cancelled_ = true;
   registry_->CancelWait(cancelled_);
-  Finish(absl::CancelledError("the client has cancelled the call"));
+  Finish(absl::CancelledError("the client canceled the call"));
 }
 
 void SessionPreparation::EndOfCall() {

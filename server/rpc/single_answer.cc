@@ -14,9 +14,7 @@
 namespace tissueform {
 namespace {
 
-absl::Status ClientHasCancelled() {
-  return absl::CancelledError("the client has cancelled the call");
-}
+absl::Status ClientHasCancelled() { return absl::CancelledError("the client canceled the call"); }
 
 // Lives as long as one of its jobs waits or runs.
 class Search : public std::enable_shared_from_this<Search> {

@@ -49,7 +49,7 @@ absl::StatusOr<ResponseRequest> ReadResponse(const v1::PreparedAnswers& settings
                                               session.poisson_ratio()));
     if (!TraitsOf(configuration.model).is_elastic) {
       return absl::InvalidArgumentError(
-          "prepared.ranges are of linear_elastic and neo_hookean; choose one of them, or leave "
+          "prepared.ranges need linear_elastic or neo_hookean; choose one of them, or leave "
           "them out");
     }
   }

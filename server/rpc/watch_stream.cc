@@ -46,7 +46,7 @@ absl::StatusOr<std::string> ParseWatchName(const std::string& name) {
   absl::string_view id = name;
   if (absl::ConsumePrefix(&id, kPrefix) && !id.empty()) return std::string(id);
   return absl::InvalidArgumentError(
-      "watch is not the name of a watch; send the one that `started` told, \"watches/{id}\"");
+      "invalid watch name; send the one in `started`, \"watches/{id}\"");
 }
 
 WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request,
@@ -79,7 +79,7 @@ absl::Status WatchStreamReactor::ReadRequest(const grpc::ByteBuffer& bytes) {
   grpc::ByteBuffer copy = bytes;  // reading uses it up
   v1::WatchRequest request;
   if (!grpc::SerializationTraits<v1::WatchRequest>::Deserialize(&copy, &request).ok()) {
-    return absl::InvalidArgumentError("the request is no WatchRequest");
+    return absl::InvalidArgumentError("the request is not a WatchRequest");
   }
   TF_ASSIGN_OR_RETURN(session_id_,
                       AllowedSession(access_, &scope_, request.session(), Permission::kRead));
@@ -176,7 +176,7 @@ void WatchStreamReactor::OnCancel() {
   *cancelled_ = true;
   registry_->CancelWait(cancelled_);
   MutexLock lock(mutex_);
-  End(absl::CancelledError("the client has ended the watch"));
+  End(absl::CancelledError("the client ended the watch"));
   Advance();
 }
 
@@ -236,9 +236,9 @@ void WatchStreamReactor::EndWatch(const absl::Status& outcome) {
 absl::Status WatchStreamReactor::Acknowledge(uint64_t number, const Authenticated& by) {
   MutexLock lock(mutex_);
   if (number > last_sent_) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("ack of frame ", number, ", but the last one that was sent is ", last_sent_,
-                     "; acknowledge frames that arrived"));
+    return absl::InvalidArgumentError(absl::StrCat("ack of frame ", number,
+                                                   ", but the last frame sent is ", last_sent_,
+                                                   "; acknowledge frames that arrived"));
   }
   scope_.RenewFrom(by);
   while (!unacked_.empty() && unacked_.front() <= number) unacked_.pop_front();

@@ -32,7 +32,7 @@ Result Await(const std::function<void(std::function<void(Result)>)>& call) {
 // Without the message, which names files.
 void WarnUnlessOk(const absl::Status& status, const char* what) {
   if (status.ok()) return;
-  spdlog::warn("housekeeping: {}: {}; it is tried again later", what,
+  spdlog::warn("housekeeping: {}: {}; retried later", what,
                absl::StatusCodeToString(status.code()));
 }
 
@@ -105,7 +105,7 @@ Housekeeping::Removed Housekeeping::RunOnce() {
           removed.exports >
       0) {
     spdlog::info(
-        "deleted for their age: {} sessions, {} predictions, {} meshes, {} uploads, {} cases, {} "
+        "deleted by retention: {} sessions, {} predictions, {} meshes, {} uploads, {} cases, {} "
         "exports",
         removed.sessions, removed.predictions, removed.meshes, removed.uploads, removed.cases,
         removed.exports);
@@ -115,7 +115,7 @@ Housekeeping::Removed Housekeeping::RunOnce() {
 
 bool Housekeeping::WriteUse() {
   const absl::Status asked = stores_->AskTime();
-  WarnUnlessOk(asked, "the store's time is not known");
+  WarnUnlessOk(asked, "the store's time is unknown");
   if (!asked.ok()) return false;
   const Clock::TimePoint now = options_.clock->Now();
   const int64_t unix_s = NowS();
@@ -144,14 +144,14 @@ bool Housekeeping::WriteUse() {
 
 int Housekeeping::RemoveUploads(int64_t before_s) {
   const absl::StatusOr<int> removed = stores_->uploads().RemoveOlderThan(before_s);
-  WarnUnlessOk(removed.status(), "uploads that were broken off stay");
+  WarnUnlessOk(removed.status(), "interrupted uploads remain");
   return removed.value_or(0);
 }
 
 int Housekeeping::RemoveSessions(int64_t before_s) {
   const auto page = Await<absl::StatusOr<SessionStore::Page>>(
       [&](auto done) { stores_->sessions().ListUnused(before_s, kMaxOfARound, std::move(done)); });
-  WarnUnlessOk(page.status(), "sessions that nobody used stay");
+  WarnUnlessOk(page.status(), "unused sessions remain");
   if (!page.ok()) return 0;
   std::vector<std::string> ids;
   for (const SessionRecord& record : page->records) ids.push_back(record.id);
@@ -164,7 +164,7 @@ bool Housekeeping::RemovePredictions(int64_t before_s, Claimed* claimed, int* re
       .owner = std::nullopt, .session = std::nullopt, .after = "", .limit = kPageSize};
   do {
     absl::StatusOr<PredictionStore::Page> page = store.List(request);
-    WarnUnlessOk(page.status(), "predictions that are old stay");
+    WarnUnlessOk(page.status(), "old predictions remain");
     if (!page.ok()) return false;
     for (const PredictionRecord& record : page->records) {
       const bool old = record.created_s < before_s && !registry_->Knows(record.session);
@@ -186,7 +186,7 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
   int removed = 0;
   const absl::StatusOr<std::vector<MeshRecord>> unused =
       stores_->meshes().ListUnused(before_s, kPageSize);
-  WarnUnlessOk(unused.status(), "meshes that nobody used stay");
+  WarnUnlessOk(unused.status(), "unused meshes remain");
   if (!unused.ok()) return 0;
   std::vector<std::string> of_unknown_age;
   for (const MeshRecord& record : *unused) {
@@ -200,7 +200,7 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
       continue;
     }
     const absl::StatusOr<bool> gone = catalog_->RemoveUnused(record.sha256, written_until_);
-    WarnUnlessOk(gone.status(), "a mesh that nobody used stays");
+    WarnUnlessOk(gone.status(), "an unused mesh remains");
     removed += gone.ok() && *gone ? 1 : 0;
   }
   WarnUnlessOk(stores_->meshes().Touch(of_unknown_age, NowS()), "times of use are not written");
@@ -210,14 +210,14 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
 int Housekeeping::RemoveExports(int64_t before_s) {
   if (!options_.remove_exports) return 0;
   const absl::StatusOr<int> removed = options_.remove_exports(before_s, kMaxOfARound);
-  WarnUnlessOk(removed.status(), "exports that have not changed stay");
+  WarnUnlessOk(removed.status(), "unchanged exports remain");
   return removed.value_or(0);
 }
 
 int Housekeeping::RemoveCases(int64_t before_s, const std::set<std::string>& of_predictions) {
   const absl::StatusOr<std::vector<CaseKey>> removed =
       stores_->cases().RemoveUnused(before_s, of_predictions, kMaxOfARound);
-  WarnUnlessOk(removed.status(), "cases that nobody used stay");
+  WarnUnlessOk(removed.status(), "unused cases remain");
   return removed.ok() ? static_cast<int>(removed->size()) : 0;
 }
 

@@ -101,7 +101,7 @@ absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
 
 absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const {
   const std::string needs =
-      absl::StrCat("no room for the ", what, ": it needs ", Mebibytes(bytes), ", and ",
+      absl::StrCat("no memory for the ", what, ": it needs ", Mebibytes(bytes), ", and ",
                    Mebibytes(reserved_bytes()), " of ", Mebibytes(limit_bytes_));
   const ErrorMetadata numbers = {{"needed_bytes", absl::StrCat(bytes)},
                                  {"limit_bytes", absl::StrCat(limit_bytes_)}};
@@ -109,18 +109,18 @@ absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const 
     return WithReason(
         absl::ResourceExhaustedError(absl::StrCat(
             needs,
-            " are taken; delete sessions or meshes, or raise --memory-budget-mib of the "
+            " are in use; delete sessions or meshes, or raise --memory-budget-mib of the "
             "server")),
         ErrorReason::kMemoryBudgetFull, numbers);
   }
   ErrorMetadata of_quota = numbers;
   of_quota["quota"] = "memory-mib";
   of_quota["retry_after_ms"] = absl::StrCat(kSessionsInUseMs);
-  return WithReason(
-      absl::ResourceExhaustedError(absl::StrCat(
-          needs, " that you may have are taken; delete sessions, try again in ",
-          kSessionsInUseMs / 1000, " s, or ask for more (--quota-memory-mib of the server)")),
-      ErrorReason::kQuotaExceeded, of_quota);
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                        needs, " of your quota are in use; delete sessions, try again in ",
+                        kSessionsInUseMs / 1000,
+                        " s, or request a larger quota (--quota-memory-mib of the server)")),
+                    ErrorReason::kQuotaExceeded, of_quota);
 }
 
 bool MemoryBudget::TryTake(int64_t bytes) {

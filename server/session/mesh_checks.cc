@@ -32,10 +32,11 @@ absl::Status CheckCount(int64_t count, int64_t max, absl::string_view field,
     return absl::InvalidArgumentError(absl::StrCat(field, " is ", count, "; it must be positive"));
   }
   if (count > max) {
-    return WithReason(
-        absl::ResourceExhaustedError(absl::StrCat(field, " is ", count, ", and the server takes ",
-                                                  max, " at most; raise its ", option)),
-        ErrorReason::kMeshTooLarge, {{"field", std::string(field)}, {"limit", absl::StrCat(max)}});
+    return WithReason(absl::ResourceExhaustedError(absl::StrCat(field, " is ", count,
+                                                                ", and the server accepts at most ",
+                                                                max, "; raise its ", option)),
+                      ErrorReason::kMeshTooLarge,
+                      {{"field", std::string(field)}, {"limit", absl::StrCat(max)}});
   }
   return absl::OkStatus();
 }
@@ -105,8 +106,8 @@ absl::StatusOr<TetMesh> CheckArrivedMesh(const std::string& sha256, MeshPayload*
   if (payload->View().Sha256() != sha256) {
     return WithReason(
         absl::DataLossError(
-            "the payload does not have the declared SHA-256: it was damaged on its way, or the "
-            "digest was computed over something else (see MeshHeader.sha256); send it again"),
+            "the payload does not have the declared SHA-256: it was damaged in transit, or the "
+            "digest was computed over other data (see MeshHeader.sha256); send it again"),
         ErrorReason::kMeshDamagedOnItsWay);
   }
   TF_RETURN_IF_ERROR(CheckCellArraysFinite(payload->cell_arrays()));

@@ -19,7 +19,7 @@ absl::Status OutOfPlace(int64_t offset, int64_t received, bool first) {
   return WithReason(
       absl::InvalidArgumentError(absl::StrCat(
           "chunk begins at ", offset, ", but ", received, " bytes of this mesh are there",
-          first && received > 0 ? "; go on there, or begin anew at 0"
+          first && received > 0 ? "; continue there, or start again at 0"
                                 : "; send chunks without gaps, in order, from there")),
       ErrorReason::kChunkOutOfPlace, {{"committed_bytes", absl::StrCat(received)}});
 }
@@ -35,7 +35,7 @@ MeshUpload::~MeshUpload() {
   // Many of them would fill all places with nothing.
   if (committed.ok() && *committed == 0) store.Drop(PartName(announced_)).IgnoreError();
   if (!committed.ok() && !absl::IsNotFound(committed.status())) {
-    spdlog::warn("an upload begins anew when it goes on: {}", committed.status().ToString());
+    spdlog::warn("an upload starts again: {}", committed.status().ToString());
   }
   uploads_->Release(PartName(announced_));
 }
@@ -58,7 +58,7 @@ absl::Status MeshUpload::Write(int64_t offset, absl::string_view data, bool last
   if (offset != received_bytes_ && !anew) return OutOfPlace(offset, received_bytes_, first_);
   if (size > total_bytes - offset) {
     return absl::InvalidArgumentError(absl::StrCat("chunk at ", offset, " with ", size,
-                                                   " bytes goes past the end of the ", total_bytes,
+                                                   " bytes exceeds the ", total_bytes,
                                                    " declared bytes"));
   }
   if (anew) TF_RETURN_IF_ERROR(BeginAnew());
@@ -79,7 +79,7 @@ absl::StatusOr<std::shared_ptr<const StoredMesh>> MeshUpload::Finish() {
   const absl::Status& status = stored.status();
   if (status.ok() || absl::IsDataLoss(status) || absl::IsInvalidArgument(status)) {
     if (const absl::Status dropped = store.Drop(PartName(announced_)); !dropped.ok()) {
-      spdlog::warn("the part of an upload stays for a day: {}", dropped.ToString());
+      spdlog::warn("an incomplete upload remains for a day: {}", dropped.ToString());
     }
   }
   return stored;
@@ -107,9 +107,8 @@ absl::StatusOr<UploadProgress> MeshUploads::Query(const std::string& sha256,
 absl::Status MeshUploads::Claim(const std::string& part_name) {
   MutexLock lock(mutex_);
   if (!claimed_.insert(part_name).second) {
-    return WithReason(
-        absl::AbortedError("another client is sending this mesh; wait until it is done, or goes"),
-        ErrorReason::kUploadUnderWay);
+    return WithReason(absl::AbortedError("another client is sending this mesh; wait and try again"),
+                      ErrorReason::kUploadUnderWay);
   }
   return absl::OkStatus();
 }

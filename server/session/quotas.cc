@@ -18,7 +18,7 @@ absl::Status QuotaExceeded(absl::string_view what, absl::string_view name, int64
       1, std::chrono::duration_cast<std::chrono::milliseconds>(try_again_after).count());
   return WithReason(
       absl::ResourceExhaustedError(absl::StrCat(
-          "you have as many ", what, " as you may, ", limit, " (--quota-", name,
+          "you have reached your quota of ", what, ", ", limit, " (--quota-", name,
           " of the server); end some, or try again in ", (wait_ms + 999) / 1000, " s")),
       ErrorReason::kQuotaExceeded,
       {{"quota", std::string(name)},

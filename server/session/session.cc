@@ -99,12 +99,11 @@ absl::Status Session::Prepare(const Eigen::VectorXd& stiffness,
 absl::Status Session::Closed() const {
   if (moved_) return SessionMoved("");
   if (updated_) {
-    return WithReason(
-        absl::AbortedError(absl::StrCat("sessions/", id_, " was updated meanwhile; try again")),
-        ErrorReason::kSessionUpdated);
+    return WithReason(absl::AbortedError(absl::StrCat("sessions/", id_, " was updated; try again")),
+                      ErrorReason::kSessionUpdated);
   }
   return WithReason(
-      absl::NotFoundError(absl::StrCat("sessions/", id_, " has been deleted; create it again")),
+      absl::NotFoundError(absl::StrCat("sessions/", id_, " was deleted; create it again")),
       ErrorReason::kSessionNotFound);
 }
 
@@ -205,7 +204,7 @@ absl::StatusOr<Deformation> Session::Solve(DeformationModel model,
   TF_ASSIGN_OR_RETURN(MemoryReservation room, budget_->Reserve(0, "session"));
   DeformControl with_room = control;
   with_room.admission = [&room](int64_t bytes) {
-    return room.Resize(room.bytes() + bytes, "second factor of a search");
+    return room.Resize(room.bytes() + bytes, "second factor of the search");
   };
   return deformer->Deform(poses, with_room);
 }

@@ -43,10 +43,10 @@ absl::Status EndingId(const std::string& id) {
 absl::Status SessionMoved(const std::string& node) {
   ErrorMetadata metadata;
   if (!node.empty()) metadata["node"] = node;
-  return WithReason(
-      absl::UnavailableError("another server holds the session, or may by now; call again, and the "
-                             "session is found where it is"),
-      ErrorReason::kSessionMoved, metadata);
+  return WithReason(absl::UnavailableError(
+                        "another server holds the session, or may hold it; call again, and the "
+                        "call reaches that server"),
+                    ErrorReason::kSessionMoved, metadata);
 }
 
 absl::Status MovedIfFenced(absl::Status status) {
@@ -66,13 +66,13 @@ absl::Status NoSuchMesh() {
 }
 
 absl::Status NoMeshAnyMore() {
-  return WithReason(absl::NotFoundError("the mesh was deleted meanwhile; upload it"),
+  return WithReason(absl::NotFoundError("the mesh was deleted; upload it"),
                     ErrorReason::kMeshNotFound);
 }
 
 absl::Status TooManySessions(int limit, absl::string_view what, absl::string_view remedy) {
   return WithReason(absl::ResourceExhaustedError(absl::StrCat(
-                        "the server ", what, " ", limit, " sessions, as many as it may", remedy)),
+                        "the server ", what, " ", limit, " sessions, which is the limit", remedy)),
                     ErrorReason::kTooManySessions, {{"limit", absl::StrCat(limit)}});
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 // Where nobody waits for the end of a session.
 void WarnIfLeftBehind(const absl::Status& status) {
-  if (!status.ok()) spdlog::warn("a session's record stays behind: {}", status.ToString());
+  if (!status.ok()) spdlog::warn("a session's record remains: {}", status.ToString());
 }
 
 }  // namespace
@@ -176,7 +176,7 @@ int SessionEvictor::Evict(const std::function<bool()>& enough,
     evicted->Close(Session::CloseReason::kEvicted);
     ++count;
   }
-  if (count > 0) spdlog::info("{} sessions that were not in use have left memory", count);
+  if (count > 0) spdlog::info("{} unused sessions were evicted from memory", count);
   return count;
 }
 

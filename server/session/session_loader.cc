@@ -286,7 +286,7 @@ void SessionLoader::FinishRestore(const PendingSessionPtr& making,
       result = known->session;  // an update has made it meanwhile
     } else if (known != nullptr && known->version != making->version) {
       // That one has left memory again, and what was made is the session before it.
-      result = absl::CancelledError("the session was updated meanwhile");
+      result = absl::CancelledError("the session was updated");
       making->version = known->version;
     }
     // All who waited had cancelled, and then somebody came.
@@ -336,7 +336,7 @@ void SessionLoader::CancelWait(const SessionWaiter::CancelFlag& cancelled) {
     gone = sessions_->table.TakeWaiters(cancelled);
   }
   for (const SessionWaiter& waiter : gone) {
-    waiter.done(absl::CancelledError("the client has cancelled the call"));
+    waiter.done(absl::CancelledError("the client canceled the call"));
   }
 }
 

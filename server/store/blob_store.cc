@@ -109,13 +109,13 @@ absl::Status BlobStore::Read(const std::string& sha256,
     return sink(piece);
   }));
   if (digest.Hex() == sha256) return absl::OkStatus();
-  return Damaged(Path(sha256), "its bytes have another SHA-256 than its name");
+  return Damaged(Path(sha256), "its SHA-256 does not match its name");
 }
 
 absl::StatusOr<int64_t> BlobStore::Size(const std::string& sha256) const {
   struct stat status {};
   if (stat(Path(sha256).c_str(), &status) != 0) {
-    return FileError(errno, "cannot look at", Path(sha256));
+    return FileError(errno, "cannot read", Path(sha256));
   }
   return static_cast<int64_t>(status.st_size);
 }

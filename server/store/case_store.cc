@@ -16,7 +16,7 @@ namespace tissueform {
 absl::Status CheckCaseRecord(const CaseRecord& record) {
   if (!IsSha256Hex(record.sha256)) {
     return absl::InvalidArgumentError(
-        "the name of a case is its file's SHA-256, in 64 lower-case hexadecimal digits");
+        "a case is named by its file's SHA-256, 64 lower-case hexadecimal digits");
   }
   if (record.total_bytes > 0) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
@@ -25,15 +25,16 @@ absl::Status CheckCaseRecord(const CaseRecord& record) {
 
 absl::Status CaseWriter::Write(int64_t offset, absl::string_view bytes) {
   if (offset != written_bytes_) {
-    return WithReason(
-        absl::InvalidArgumentError(absl::StrCat("case ", record_.sha256, ": ", written_bytes_,
-                                                " bytes have come; go on there, not at ", offset)),
-        ErrorReason::kChunkOutOfPlace, {{"committed_bytes", absl::StrCat(written_bytes_)}});
+    return WithReason(absl::InvalidArgumentError(
+                          absl::StrCat("case ", record_.sha256, ": ", written_bytes_,
+                                       " bytes have arrived; continue there, not at ", offset)),
+                      ErrorReason::kChunkOutOfPlace,
+                      {{"committed_bytes", absl::StrCat(written_bytes_)}});
   }
   if (bytes.size() > static_cast<size_t>(record_.total_bytes - written_bytes_)) {
     return absl::InvalidArgumentError(
         absl::StrCat("case ", record_.sha256, " ends at ", record_.total_bytes,
-                     " bytes, as its header says; the chunk at ", offset, " reaches further"));
+                     " bytes by its header; the chunk at ", offset, " reaches further"));
   }
   TF_RETURN_IF_ERROR(Append(bytes));
   digest_.Add(bytes);
@@ -50,7 +51,7 @@ absl::StatusOr<CaseRecord> CaseWriter::Finish() {
   if (digest_.Hex() != record_.sha256) {
     return WithReason(absl::DataLossError(absl::StrCat(
                           "the bytes of case ", record_.sha256,
-                          " have another SHA-256: damaged on their way; send them again")),
+                          " have another SHA-256: they were damaged in transit; send them again")),
                       ErrorReason::kCaseDamagedOnItsWay);
   }
   return Keep();
@@ -67,7 +68,7 @@ absl::StatusOr<std::string> CaseReader::Read(int64_t offset, int64_t size) {
   digest_.Add(bytes);
   digested_bytes_ += got;
   if (got > 0 && digested_bytes_ == total_bytes_ && digest_.Hex() != sha256_) {
-    return SetAside(Damaged(absl::StrCat("case ", sha256_), "its bytes have another SHA-256"));
+    return SetAside(Damaged(absl::StrCat("case ", sha256_), "its SHA-256 is wrong"));
   }
   return bytes;
 }

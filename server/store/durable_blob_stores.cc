@@ -90,7 +90,7 @@ absl::StatusOr<MeshPayload> DurableMeshStore::Read(const std::string& sha256) {
       }
       return payload;
     }
-    status = Damaged(absl::StrCat("mesh ", sha256), "its file is gone; upload it again");
+    status = Damaged(absl::StrCat("mesh ", sha256), "its file is missing; upload it again");
   }
   return SetBlobAside(thread_, blobs_, sha256, status);
 }
@@ -113,7 +113,7 @@ absl::StatusOr<MeshPayload> DurableMeshStore::ReadBlob(const MeshRecord& record)
     return absl::OkStatus();
   }));
   if (head != text || offset != record.total_bytes) {
-    return Damaged(absl::StrCat("mesh ", record.sha256), "its file is another mesh's");
+    return Damaged(absl::StrCat("mesh ", record.sha256), "its file belongs to another mesh");
   }
   return payload;
 }
@@ -212,7 +212,7 @@ absl::StatusOr<std::string> DurablePredictionStore::Positions(const std::string&
     if (!absl::IsNotFound(status)) return status;
   }
   return SetBlobAside(thread_, blobs_, sha256,
-                      Damaged(absl::StrCat("prediction \"", id, "\""), "its file is gone"));
+                      Damaged(absl::StrCat("prediction \"", id, "\""), "its file is missing"));
 }
 
 absl::StatusOr<PredictionStore::Page> DurablePredictionStore::List(const ListRequest& request) {

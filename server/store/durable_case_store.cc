@@ -150,7 +150,7 @@ absl::StatusOr<CaseRecord> DurableCaseStore::Find(const CaseKey& key) {
 absl::StatusOr<std::unique_ptr<CaseReader>> DurableCaseStore::Open(const CaseKey& key,
                                                                    int64_t now_s) {
   const std::string& sha256 = key.sha256;
-  absl::Status damage = Damaged(absl::StrCat("case ", sha256), "its file is gone");
+  absl::Status damage = Damaged(absl::StrCat("case ", sha256), "its file is missing");
   for (int attempt = 0; attempt < kReadAttempts; ++attempt) {
     TF_ASSIGN_OR_RETURN(const CaseRecord record, Find(key));
     absl::StatusOr<OpenFile> file = blobs_->OpenBlob(sha256);

@@ -34,7 +34,7 @@ std::function<absl::Status()> StillThere(const DataFolder& folder) {
     return absl::UnavailableError(
         absl::StrCat("database ", folder.database(),
                      ": it has been removed or replaced while the server runs, nothing can be "
-                     "kept; put it back and start the server again"));
+                     "kept; restore it and restart the server"));
   };
 }
 

@@ -31,7 +31,7 @@ struct DurableStoreOptions {
 };
 
 // What the server keeps for good: rows in one SQLite database, meshes, positions and cases as files
-// beside it (docs/operations.md, "What the server keeps, and where").
+// beside it (docs/operations.md, "Stored data").
 //
 // One thread writes and reads rows, in the order of the calls; what waits is committed together. A
 // call is answered after its commit, on that thread for SessionStore. From such an answer the

@@ -60,8 +60,8 @@ absl::Status InMemoryCaseStore::Reserve(int64_t bytes) {
   MutexLock lock(mutex_);
   if (bytes_ + bytes > most_bytes_) {
     return absl::ResourceExhaustedError(
-        absl::StrCat("cases of a server that keeps them in memory may take ", most_bytes_ >> 20,
-                     " MiB together, and that is full; delete some, or run it with --data-dir"));
+        absl::StrCat("the cases of a server with --in-memory are limited to ", most_bytes_ >> 20,
+                     " MiB together; delete some, or run the server with --data-dir"));
   }
   bytes_ += bytes;
   return absl::OkStatus();

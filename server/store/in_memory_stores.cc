@@ -125,8 +125,8 @@ absl::Status InMemoryPredictionStore::Create(const PredictionRecord& record,
   Prediction prediction{record, positions};
   if (bytes_ + prediction.Bytes() > most_bytes_) {
     return absl::ResourceExhaustedError(absl::StrCat(
-        "predictions of a server that keeps them in memory may take ", most_bytes_ >> 20,
-        " MiB together, and that is full; delete some, or run it with --data-dir"));
+        "the predictions of a server with --in-memory are limited to ", most_bytes_ >> 20,
+        " MiB together; delete some, or run the server with --data-dir"));
   }
   bytes_ += prediction.Bytes();
   predictions_.emplace(record.id, std::move(prediction));

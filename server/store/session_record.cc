@@ -55,7 +55,7 @@ absl::Status ReadPoses(const store::v1::SessionRecord& proto, SessionRecord* rec
   for (int h = 0; h < proto.last_poses_size(); ++h) {
     NamedPose pose = ToNamedPose(proto.last_poses(h));
     if (pose.handle != proto.handles(h).name() || !CheckPose(pose.pose).ok()) {
-      return Damaged(absl::StrCat("pose ", h, " is not one of its handle"));
+      return Damaged(absl::StrCat("pose ", h, " does not belong to its handle"));
     }
     record->last_poses.push_back(pose.pose);
   }
@@ -111,7 +111,7 @@ std::string SerializeRecord(const SessionRecord& record) {
 
 absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes) {
   store::v1::SessionRecord proto;
-  if (!Parse(bytes, &proto)) return Damaged("its bytes are not a record");
+  if (!Parse(bytes, &proto)) return Damaged("it is not a record");
   if (proto.id().empty()) return Damaged("it has no id");
   if (!IsSha256Hex(proto.mesh_sha256())) return Damaged("its mesh has no name");
   SessionRecord record;
@@ -137,7 +137,8 @@ absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes) {
   record.request_id = proto.request_id();
   record.request_fingerprint = proto.request_fingerprint();
   record.node_order = {proto.node_order().begin(), proto.node_order().end()};
-  if (!IsPermutation(record.node_order)) return Damaged("its order of vertices is no permutation");
+  if (!IsPermutation(record.node_order))
+    return Damaged("its order of vertices is not a permutation");
   return record;
 }
 
@@ -149,13 +150,13 @@ std::string SerializePoses(const std::vector<HandlePose>& poses) {
 
 absl::StatusOr<std::vector<HandlePose>> ParsePoses(absl::string_view bytes) {
   store::v1::Poses proto;
-  if (!Parse(bytes, &proto)) return Damaged("its poses are none");
+  if (!Parse(bytes, &proto)) return Damaged("its poses are unreadable");
   std::vector<HandlePose> poses;
   poses.reserve(proto.poses_size());
   for (const v1::HandlePose& pose : proto.poses()) {
     poses.push_back(ToNamedPose(pose).pose);
     if (!CheckPose(poses.back()).ok()) {
-      return Damaged(absl::StrCat("pose ", poses.size() - 1, " is none"));
+      return Damaged(absl::StrCat("pose ", poses.size() - 1, " is invalid"));
     }
   }
   return poses;

@@ -196,7 +196,7 @@ absl::Status RemoveLeftovers(OpenedDatabase& opened, BlobStore& blobs,
       continue;
     }
     TF_ASSIGN_OR_RETURN(const std::string path, blobs.SetAside(sha256));
-    damaged->push_back({absl::StrCat("file ", sha256), "no record of it is left", path});
+    damaged->push_back({absl::StrCat("file ", sha256), "no record of it remains", path});
   }
   return absl::OkStatus();
 }
@@ -252,8 +252,8 @@ absl::StatusOr<OpenedDatabase> OpenCheckedDatabase(const DataFolder& folder, int
   }
   if (absl::IsDataLoss(status)) {
     return absl::DataLossError(
-        absl::StrCat(status.message(), "; it cannot be mended: put a backup in place of ",
-                     folder.database(), ", or move it away to begin with nothing"));
+        absl::StrCat(status.message(), "; it cannot be repaired: restore a backup over ",
+                     folder.database(), ", or move it to start with an empty store"));
   }
   TF_RETURN_IF_ERROR(status);
   return opened;

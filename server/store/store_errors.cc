@@ -23,11 +23,11 @@ const char* SentenceOf(absl::StatusCode code) {
     case absl::StatusCode::kUnavailable:
       return "the server's database does not answer; try again in a minute";
     case absl::StatusCode::kResourceExhausted:
-      return "the disk of the server's database is full; tell who operates the server";
+      return "the disk of the server's database is full; tell the server's operator";
     case absl::StatusCode::kFailedPrecondition:
-      return "the server's database takes no changes now; tell who operates the server";
+      return "the server's database is read-only now; tell the server's operator";
     default:
-      return "the server's database has failed; tell who operates the server";
+      return "the server's database has failed; tell the server's operator";
   }
 }
 
@@ -48,13 +48,12 @@ absl::Status CheckSessionWrite(absl::string_view id, absl::string_view etag, int
                                absl::string_view kept_etag, int64_t kept_epoch) {
   if (epoch < kept_epoch) {
     return absl::FailedPreconditionError(absl::StrCat("epoch ", epoch, " of session \"", id,
-                                                      "\" is over, it is ", kept_epoch,
+                                                      "\" has ended, it is ", kept_epoch,
                                                       " now: another server has taken it"));
   }
   if (!etag.empty() && etag != kept_etag) {
     return WithReason(
-        absl::AbortedError(
-            absl::StrCat("session \"", id, "\" has changed in the meantime; get it and try again")),
+        absl::AbortedError(absl::StrCat("session \"", id, "\" has changed; get it and try again")),
         ErrorReason::kStaleEtag);
   }
   return absl::OkStatus();
@@ -64,7 +63,7 @@ absl::Status CheckPoseCount(absl::string_view id, size_t poses, size_t handles) 
   if (poses == 0 || poses == handles) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("session \"", id, "\" has ", handles,
                                                  " handles, not ", poses,
-                                                 "; commit one pose a handle, or none for rest"));
+                                                 "; commit one pose per handle, or none for rest"));
 }
 
 absl::Status MeshHasSessions(int64_t sessions) {
@@ -75,7 +74,7 @@ absl::Status MeshHasSessions(int64_t sessions) {
 }
 
 absl::Status NoMesh(absl::string_view sha256) {
-  return WithReason(absl::NotFoundError(absl::StrCat("no mesh ", sha256, " is kept; upload it")),
+  return WithReason(absl::NotFoundError(absl::StrCat("no mesh ", sha256, " is stored; upload it")),
                     ErrorReason::kMeshNotFound);
 }
 
@@ -85,14 +84,14 @@ absl::Status NoPrediction(absl::string_view id) {
 }
 
 absl::Status NoCase(absl::string_view sha256) {
-  return WithReason(absl::NotFoundError(absl::StrCat("no case ", sha256, " is kept; upload it")),
+  return WithReason(absl::NotFoundError(absl::StrCat("no case ", sha256, " is stored; upload it")),
                     ErrorReason::kCaseNotFound);
 }
 
 absl::Status TooManyCases(int most) {
   return WithReason(
       absl::ResourceExhaustedError(absl::StrCat(
-          "the server keeps ", most, " cases, which is its limit (max_cases); delete some")),
+          "the server keeps ", most, " cases, which is the limit (max_cases); delete some")),
       ErrorReason::kTooManyCases, {{"limit", absl::StrCat(most)}});
 }
 
@@ -102,9 +101,8 @@ absl::Status PredictionExists(absl::string_view id) {
 }
 
 absl::Status NoUpload(absl::string_view sha256) {
-  return WithReason(
-      absl::NotFoundError(absl::StrCat("no upload of ", sha256, " is under way; begin it")),
-      ErrorReason::kUploadNotFound);
+  return WithReason(absl::NotFoundError(absl::StrCat("no upload of ", sha256, " exists; start it")),
+                    ErrorReason::kUploadNotFound);
 }
 
 absl::Status BadLimit(int limit) {
@@ -114,7 +112,7 @@ absl::Status BadLimit(int limit) {
 absl::Status CheckMeshName(absl::string_view sha256) {
   if (IsSha256Hex(sha256)) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      "the name of a mesh is its SHA-256, in 64 lower-case hexadecimal digits");
+      "a mesh is named by its SHA-256, 64 lower-case hexadecimal digits");
 }
 
 absl::Status Damaged(absl::string_view what, absl::string_view why) {
@@ -130,7 +128,7 @@ absl::Status CheckMeshRecord(const MeshRecord& record, const MeshPayloadView& pa
                           record.shape.cell_arrays == payload.shape.cell_arrays;
   if (!same_shape || record.total_bytes < 0 || static_cast<size_t>(record.total_bytes) != bytes) {
     return absl::InvalidArgumentError(
-        absl::StrCat("the record of mesh ", record.sha256, " is not that of its payload"));
+        absl::StrCat("the record of mesh ", record.sha256, " does not match its payload"));
   }
   return absl::OkStatus();
 }
@@ -142,7 +140,7 @@ absl::Status CheckPrediction(const PredictionRecord& record, const std::string& 
   if (bytes % kVertexBytes != 0 || bytes / kVertexBytes != record.vertex_count) {
     return absl::InvalidArgumentError(absl::StrCat("prediction \"", record.id, "\" has ", bytes,
                                                    " bytes of positions for ", record.vertex_count,
-                                                   " vertices; it needs 12 a vertex"));
+                                                   " vertices; it needs 12 per vertex"));
   }
   return absl::OkStatus();
 }

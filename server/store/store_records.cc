@@ -57,7 +57,7 @@ std::string SerializeMesh(const MeshRecord& record) {
 
 absl::StatusOr<MeshRecord> ParseMesh(absl::string_view bytes) {
   store::v1::MeshRecord proto;
-  if (!Parse(bytes, &proto)) return Damaged("a mesh's record", "its bytes are none");
+  if (!Parse(bytes, &proto)) return Damaged("a mesh's record", "it is unreadable");
   MeshRecord record;
   record.sha256 = proto.sha256();
   record.shape = ToShape(proto.shape());
@@ -66,7 +66,7 @@ absl::StatusOr<MeshRecord> ParseMesh(absl::string_view bytes) {
   record.skin_vertex_count = proto.skin_vertex_count();
   if (!IsSha256Hex(record.sha256)) return Damaged("a mesh's record", "it has no name");
   if (!Fits(record.shape, record.total_bytes)) {
-    return Damaged("a mesh's record", "its size is not that of its shape");
+    return Damaged("a mesh's record", "its size does not match its shape");
   }
   return record;
 }
@@ -82,7 +82,7 @@ std::string SerializeAnnouncement(const UploadAnnouncement& announcement) {
 
 absl::StatusOr<UploadAnnouncement> ParseAnnouncement(absl::string_view bytes) {
   store::v1::UploadAnnouncement proto;
-  if (!Parse(bytes, &proto)) return Damaged("an upload's announcement", "its bytes are none");
+  if (!Parse(bytes, &proto)) return Damaged("an upload's announcement", "it is unreadable");
   UploadAnnouncement announcement{ToShape(proto.shape()), proto.total_bytes(), proto.sha256(),
                                   proto.owner()};
   if (const absl::Status status = CheckAnnouncement(announcement); !status.ok()) {
@@ -107,7 +107,7 @@ std::string SerializePrediction(const PredictionRow& row) {
 
 absl::StatusOr<PredictionRow> ParsePrediction(absl::string_view bytes) {
   store::v1::PredictionRecord proto;
-  if (!Parse(bytes, &proto)) return Damaged("a prediction's record", "its bytes are none");
+  if (!Parse(bytes, &proto)) return Damaged("a prediction's record", "it is unreadable");
   if (proto.id().empty()) return Damaged("a prediction's record", "it has no id");
   if (!IsSha256Hex(proto.positions_sha256()) || proto.vertex_count() < 0 ||
       proto.vertex_count() > kMaxElements) {
@@ -139,7 +139,7 @@ std::string SerializeCaseRecord(const CaseRecord& record) {
 
 absl::StatusOr<CaseRecord> ParseCaseRecord(absl::string_view bytes) {
   store::v1::CaseRecord proto;
-  if (!Parse(bytes, &proto)) return Damaged("a case's record", "its bytes are none");
+  if (!Parse(bytes, &proto)) return Damaged("a case's record", "it is unreadable");
   CaseRecord record{.sha256 = proto.sha256(),
                     .owner = proto.owner(),
                     .project = proto.project(),
@@ -157,7 +157,7 @@ absl::Status CheckAnnouncement(const UploadAnnouncement& announcement) {
   if (Fits(announcement.shape, announcement.total_bytes)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("the upload of ", announcement.sha256,
                                                  " announces ", announcement.total_bytes,
-                                                 " bytes, which is not the size of its shape"));
+                                                 " bytes, which does not match its shape"));
 }
 
 std::string Seal(absl::string_view bytes) { return absl::StrCat(Sha256Hex({bytes}), bytes); }
@@ -165,7 +165,7 @@ std::string Seal(absl::string_view bytes) { return absl::StrCat(Sha256Hex({bytes
 absl::StatusOr<absl::string_view> Unseal(absl::string_view sealed) {
   const absl::string_view bytes = sealed.substr(std::min(kSealBytes, sealed.size()));
   if (Sha256Hex({bytes}) == sealed.substr(0, kSealBytes)) return bytes;
-  return Damaged("a record", "its bytes are not those that were kept");
+  return Damaged("a record", "its bytes have changed");
 }
 
 }  // namespace tissueform

@@ -39,10 +39,10 @@ absl::StatusOr<SessionRecord> SessionAtRestOf(const SessionRow& row) {
   record.created_s = row.created_s;
   record.last_used_s = row.last_used_s;
   if (record.id != row.id || record.owner != row.owner) {
-    return Damaged("a session's record", "it is that of another");
+    return Damaged("a session's record", "it belongs to another");
   }
   if (record.etag.empty() || row.handles != static_cast<int64_t>(record.handles.size())) {
-    return Damaged("a session's record", "it does not agree with its state");
+    return Damaged("a session's record", "it does not match its state");
   }
   return record;
 }
@@ -54,14 +54,14 @@ absl::StatusOr<SessionRecord> SessionOf(const SessionRow& row) {
   if (CheckPoseCount(record.id, record.last_poses.size(), record.handles.size()).ok()) {
     return record;
   }
-  return Damaged("a session's record", "its poses are not of its handles");
+  return Damaged("a session's record", "its poses do not match its handles");
 }
 
 absl::StatusOr<MeshRecord> MeshOf(absl::string_view sha256, absl::string_view record_bytes,
                                   int64_t last_used_s) {
   TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(record_bytes));
   TF_ASSIGN_OR_RETURN(MeshRecord record, ParseMesh(bytes));
-  if (record.sha256 != sha256) return Damaged("a mesh's record", "it is that of another");
+  if (record.sha256 != sha256) return Damaged("a mesh's record", "it belongs to another");
   record.last_used_s = last_used_s;
   return record;
 }
@@ -73,7 +73,7 @@ absl::StatusOr<PredictionRow> PredictionOf(const PredictionColumns& row) {
   if (record.id != row.id || record.owner != row.owner || record.session != row.session ||
       prediction.positions_sha256 != row.positions_sha256 ||
       record.case_sha256 != row.case_sha256) {
-    return Damaged("a prediction's record", "it is that of another");
+    return Damaged("a prediction's record", "it belongs to another");
   }
   return prediction;
 }
@@ -82,7 +82,7 @@ absl::StatusOr<CaseRecord> CaseOf(const CaseRow& row) {
   TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.record));
   TF_ASSIGN_OR_RETURN(CaseRecord record, ParseCaseRecord(bytes));
   if (record.sha256 != row.sha256 || record.owner != row.owner) {
-    return Damaged("a case's record", "it is that of another");
+    return Damaged("a case's record", "it belongs to another");
   }
   record.last_used_s = row.last_used_s;
   return record;

@@ -150,12 +150,13 @@ absl::StatusOr<int64_t> SchemaVersionOf(Database& database) {
   TF_ASSIGN_OR_RETURN(const int64_t pages, Pragma(database, "SELECT count(*) FROM sqlite_schema"));
   if (application != kApplicationId && (application != 0 || pages > 0 || version != 0)) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "database ", database.path(), " is not one of tissueform; name another --data-dir"));
+        "database ", database.path(), " does not belong to tissueform; name another --data-dir"));
   }
   if (version > kSchemaVersion) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "database ", database.path(), " has been written by a newer server (version ", version,
-        ", this one knows ", kSchemaVersion, "); start that one, or name another --data-dir"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("database ", database.path(), " was written by a newer server (version ",
+                     version, ", this one knows ", kSchemaVersion,
+                     "); start the newer server, or name another --data-dir"));
   }
   return version;
 }
@@ -174,7 +175,7 @@ absl::Status QuickCheck(Database& database) {
   Database::Query query = database.Prepare("PRAGMA quick_check(1)");
   TF_ASSIGN_OR_RETURN(const bool row, query.Step());
   if (row && query.Text(0) == "ok") return absl::OkStatus();
-  return absl::DataLossError(row ? query.Text(0) : "quick_check says nothing");
+  return absl::DataLossError(row ? query.Text(0) : "quick_check returned nothing");
 }
 
 absl::Status CopyReadableRows(Database& damaged, Database& fresh) {

@@ -83,7 +83,7 @@ struct UploadStore::Part {
   // on: before it nothing was promised but a beginning at 0.
   absl::Status Sync(const std::string& folder) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     if (synced == size) return absl::OkStatus();
-    if (broken) return Damaged(announcement.sha256, "it could not be synced; begin it anew");
+    if (broken) return Damaged(announcement.sha256, "it could not be synced; start it again");
     // After a sync that failed the kernel may have thrown the bytes away, and the next sync would
     // say OK all the same: such a part cannot be mended.
     broken = true;
@@ -176,7 +176,7 @@ absl::Status UploadStore::TakeUpPart(const std::string& base) {
   TF_ASSIGN_OR_RETURN(UploadAnnouncement announcement, ParseAnnouncement(sealed));
   const std::string name = PartName(announcement);
   if (std::filesystem::path(base).filename() != name) {
-    return Damaged(path, "it is of another mesh");
+    return Damaged(path, "it belongs to another mesh");
   }
   absl::StatusOr<OpenFile> data = OpenFile::Open(absl::StrCat(base, kPartSuffix), O_RDWR);
   if (absl::IsNotFound(data.status())) return Damaged(path, "it has no part");
@@ -233,9 +233,9 @@ absl::StatusOr<int64_t> UploadStore::Begin(const UploadAnnouncement& announcemen
   {
     MutexLock lock(mutex_);
     if (parts_.size() >= static_cast<size_t>(limits_.max_parts)) {
-      return absl::ResourceExhaustedError(absl::StrCat(
-          "uploads: ", limits_.max_parts,
-          " meshes are partly uploaded, which is the limit; finish one, or try later"));
+      return absl::ResourceExhaustedError(
+          absl::StrCat("uploads: ", limits_.max_parts,
+                       " incomplete mesh uploads, which is the limit; finish one, or try later"));
     }
   }
   TF_ASSIGN_OR_RETURN(std::shared_ptr<Part> part, Make(announcement));
@@ -247,8 +247,8 @@ absl::StatusOr<int64_t> UploadStore::Begin(const UploadAnnouncement& announcemen
 absl::Status UploadStore::ReserveBytes(int64_t bytes) {
   MutexLock lock(mutex_);
   if (bytes_ + bytes > limits_.max_bytes) {
-    return absl::ResourceExhaustedError(absl::StrCat("uploads: partly uploaded meshes may take ",
-                                                     limits_.max_bytes, " bytes in all, and take ",
+    return absl::ResourceExhaustedError(absl::StrCat("incomplete mesh uploads are limited to ",
+                                                     limits_.max_bytes, " bytes together, and use ",
                                                      bytes_, "; finish one, or try later"));
   }
   bytes_ += bytes;
@@ -265,14 +265,14 @@ absl::Status UploadStore::Append(const std::string& part_name, int64_t offset,
   if (offset != part->size) {
     return WithReason(absl::InvalidArgumentError(
                           absl::StrCat("upload of ", sha256, ": ", part->size,
-                                       " bytes are committed; go on there, not at ", offset)),
+                                       " bytes are committed; continue there, not at ", offset)),
                       ErrorReason::kChunkOutOfPlace,
                       {{"committed_bytes", absl::StrCat(part->size)}});
   }
   if (count > part->announcement.total_bytes - offset) {
-    return absl::InvalidArgumentError(absl::StrCat("upload of ", sha256, ": it ends at ",
-                                                   part->announcement.total_bytes,
-                                                   " bytes; these reach to ", offset + count));
+    return absl::InvalidArgumentError(
+        absl::StrCat("upload of ", sha256, ": it ends at ", part->announcement.total_bytes,
+                     " bytes; this chunk reaches to ", offset + count));
   }
   TF_RETURN_IF_ERROR(ReserveBytes(count));
   if (const absl::Status status = part->data.WriteAt(offset, bytes); !status.ok()) {
@@ -309,7 +309,7 @@ absl::StatusOr<MeshPayload> UploadStore::Read(const std::string& part_name) {
   if (part->size != total_bytes) {
     return absl::FailedPreconditionError(absl::StrCat("upload of ", sha256, ": ", part->size,
                                                       " of ", total_bytes,
-                                                      " bytes are there; send the rest"));
+                                                      " bytes have arrived; send the rest"));
   }
   MeshPayload payload(part->announcement.shape);
   for (int64_t offset = 0; offset < total_bytes;) {

@@ -124,18 +124,17 @@ absl::Status AuditFile::OpenAtPath(bool begins) {
   if (fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
     close(fd);
     return absl::FailedPreconditionError(
-        absl::StrCat("audit log ", options_.path, ": is no regular file; name another one"));
+        absl::StrCat("audit log ", options_.path, ": not a regular file; name another one"));
   }
   if (begins && status.st_size > 0) {
     close(fd);
     return absl::FailedPreconditionError(
-        absl::StrCat("audit log ", options_.path,
-                     ": a file that is not the server's is in the way; move it elsewhere"));
+        absl::StrCat("audit log ", options_.path, ": another file is in the way; move it"));
   }
   if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
     close(fd);
     return absl::FailedPreconditionError(absl::StrCat(
-        "audit log ", options_.path, ": another process writes it; give each server its own"));
+        "audit log ", options_.path, ": another process writes it; each server needs its own"));
   }
   if (fd_ >= 0) close(fd_);
   fd_ = fd;
@@ -165,13 +164,13 @@ absl::Status AuditFile::SetAside(int64_t from, int64_t size) {
   const int fd = open(aside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, S_IRUSR | S_IWUSR);
   const bool kept = fd >= 0 && WriteAll(fd, bytes) && fsync(fd) == 0;
   if (fd >= 0) close(fd);
-  if (!kept) return DiskError("its torn end cannot be set aside");
+  if (!kept) return DiskError("its incomplete last line cannot be set aside");
   return Mend();
 }
 
 absl::Status AuditFile::Mend() {
   is_torn_ = ftruncate(fd_, size_) != 0;
-  return is_torn_ ? DiskError("its torn end cannot be mended") : absl::OkStatus();
+  return is_torn_ ? DiskError("its incomplete last line cannot be repaired") : absl::OkStatus();
 }
 
 bool AuditFile::IsAtPath() const {

@@ -23,8 +23,8 @@ constexpr size_t kMaxTogether = 1024;
 absl::Status NotWritten(const char* why) {
   return WithReason(
       absl::UnavailableError(absl::StrFormat(
-          "the audit log %s, so the server takes no work that belongs there; try again later, or "
-          "tell who operates it",
+          "the audit log %s, so the server refuses audited calls; try again later, or "
+          "tell its operator",
           why)),
       ErrorReason::kAuditNotWritten);
 }
@@ -133,7 +133,7 @@ void AuditLog::Work() {
   while (WaitForWork()) {
     WriteBatch();
     if (ending_ && counts_.failing) {
-      spdlog::error("audit: {} lines could not be written before the end", waiting_.size());
+      spdlog::error("audit: {} lines could not be written before shutdown", waiting_.size());
       break;
     }
   }
@@ -163,11 +163,11 @@ void AuditLog::WriteBatch() {
     waiting_.insert(waiting_.begin(), std::make_move_iterator(batch.begin()),
                     std::make_move_iterator(batch.end()));
     if (!counts_.failing) {
-      spdlog::error("{}; work is refused until it can", std::string(status.message()));
+      spdlog::error("{}; audited calls are refused until then", std::string(status.message()));
     }
   } else {
     counts_.written += static_cast<int64_t>(batch.size());
-    if (counts_.failing) spdlog::info("the audit log is written again");
+    if (counts_.failing) spdlog::info("the audit log is writable again");
   }
   counts_.failing = !status.ok();
   changed_.NotifyAll();

@@ -78,8 +78,8 @@ void CallMetrics::AddTo(MetricsPage* page) const {
     page->AddCounter("tissueform_failures_total", "Calls that have failed, by reason.",
                      {{"reason", reason}}, ReadOf(of_reason.all));
     page->AddCounter("tissueform_authentication_failures_total",
-                     "Calls that ended because nobody knew their caller, by reason.",
-                     {{"reason", reason}}, ReadOf(of_reason.unauthenticated));
+                     "Calls without an authenticated caller, by reason.", {{"reason", reason}},
+                     ReadOf(of_reason.unauthenticated));
   }
 }
 

@@ -53,10 +53,10 @@ double FreeBytes(const std::string& folder) {
 }  // namespace
 
 void AddFrameMetrics(const FrameMeasures& measures, MetricsPage* page) {
-  page->AddCounter("tissueform_poses_total", "Poses that drags have sent.", {},
+  page->AddCounter("tissueform_poses_total", "Poses received from drags.", {},
                    ReadNumber(measures.poses));
   page->AddCounter("tissueform_coalesced_poses_total",
-                   "Poses that a newer one has replaced before they were answered.", {},
+                   "Poses replaced by newer ones before they were answered.", {},
                    ReadNumber(measures.coalesced_poses));
   page->AddCounter("tissueform_frames_total", "Frames that drags were sent.", {},
                    ReadNumber(measures.frames));
@@ -64,7 +64,7 @@ void AddFrameMetrics(const FrameMeasures& measures, MetricsPage* page) {
                      "From the arrival of a pose until its frame is handed to the network.", {},
                      &measures.latency);
   page->AddHistogram("tissueform_picture_age_seconds",
-                     "How old the pose of a frame was, counted from its arrival here, when the "
+                     "Age of a frame's pose since its arrival when the "
                      "client acknowledged it.",
                      {}, &measures.picture_age);
 }
@@ -126,20 +126,19 @@ void AddSecurityMetrics(const SecurityReadings& readings, MetricsPage* page) {
       "When the certificate in use ends, in Unix time.", {{"certificate", "server"}},
       readings.certificate_expires);
   add("tissueform_token_keys_read_timestamp_seconds",
-      "When the provider's keys of tokens were last read and good, in Unix time.", {},
+      "Last successful read of the provider's token keys, in Unix time.", {},
       readings.token_keys_read);
   const char* const alarm = "tissueform_credentials_alarm";
-  const char* const help = "1 while new credentials are no good, and those before stay in use.";
+  const char* const help = "1 while new credentials are invalid and the previous ones stay in use.";
   add(alarm, help, {{"kind", "certificate"}}, readings.certificate_alarm);
   add(alarm, help, {{"kind", "token_keys"}}, readings.token_keys_alarm);
   add(alarm, help, {{"kind", "revocations"}}, readings.revocations_alarm);
   if (readings.alarms != nullptr) {
-    page->AddCounter("tissueform_token_key_alarms_total",
-                     "Times that new keys of tokens or revocations were no good.", {},
-                     readings.alarms);
+    page->AddCounter("tissueform_token_key_alarms_total", "Invalid new token keys or revocations.",
+                     {}, readings.alarms);
   }
   for (const auto& [reason, read] : readings.token_failures) {
-    page->AddCounter("tissueform_token_failures_total", "Tokens that were refused, by why.",
+    page->AddCounter("tissueform_token_failures_total", "Refused tokens, by reason.",
                      {{"reason", reason}}, read);
   }
 }

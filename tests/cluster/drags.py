@@ -35,7 +35,7 @@ def shift_mm(sequence):
 
 
 class Drag(threading.Thread):
-    """Drags one session at 20 poses a second until it is told to stop. With a node it goes there alone, and never elsewhere."""
+    """Drags one session at 20 poses per second until it is told to stop. With a node it goes there alone, and never elsewhere."""
 
     def __init__(self, address, session, handle_rest, ledger, node=None, sequences=None):
         super().__init__(daemon=True)

@@ -115,7 +115,7 @@ def check_doctor(cluster):
     for _ in range(EXAMINATIONS):
         done = subprocess.run([cluster.programs / "tissueform", "doctor", cluster.address("workstations")], capture_output=True, text=True,
                               timeout=stranger.ATTEMPT_S, check=False)
-        if done.returncode != 0 or "of a cluster)" not in done.stdout:
+        if done.returncode != 0 or "in a cluster)" not in done.stdout:
             raise SystemExit(f"the doctor says of a cluster that is well:\n{done.stdout}{done.stderr}")
     print(f"the doctor finds nothing, {EXAMINATIONS} times", flush=True)
 

@@ -35,7 +35,7 @@ function layoutFaults(page: Page, parts: string[]): Promise<string[]> {
     if (scrollWidth > clientWidth || scrollHeight > clientHeight) faults.push(`the page has ${scrollWidth} x ${scrollHeight} in ${clientWidth} x ${clientHeight}`);
     const boxes = selectors.map((name) => ({ name, box: document.querySelector(name)?.getBoundingClientRect() }));
     for (const [i, { name, box }] of boxes.entries()) {
-      if (box === undefined || box.width < 1 || box.height < 1) faults.push(`${name} is not seen`);
+      if (box === undefined || box.width < 1 || box.height < 1) faults.push(`${name} is not visible`);
       if (box === undefined) continue;
       if (box.left < -0.5 || box.top < -0.5 || box.right > clientWidth + 0.5 || box.bottom > clientHeight + 0.5) faults.push(`${name} sticks out of the page`);
       for (const other of boxes.slice(i + 1)) {
@@ -100,7 +100,7 @@ describe.each(DEVICES)("on %s", (_, device) => {
     expect(await viewFaults(page)).toEqual([]);
     await page.locator("summary").getByText("Measures", { exact: true }).scrollIntoViewIfNeeded();
     await openParts(page);
-    await page.getByLabel("Colours show").selectOption({ label: "Movement of the skin" });
+    await page.getByLabel("Color by").selectOption({ label: "Movement of the skin" });
     await page.locator(".legend").waitFor({ state: "visible" });
     expect(await layoutFaults(page, PLANNER_PARTS)).toEqual([]);
     expect(await seriousFindings(page)).toEqual([]);

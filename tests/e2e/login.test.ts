@@ -73,7 +73,7 @@ test("who signs in plans under their name, and the token lies in no storage", as
   expect(faults).toEqual([]);
 });
 
-test("a drag outlives its tokens: it is told every new one, and the server takes it", async () => {
+test("a drag outlives its tokens: it is told every new one, and the server accepts at most it", async () => {
   provider.tokenSeconds = 3;
   const tokensTold: number[] = [];
   const { page, faults } = await plannerOf("bea", (early) => {
@@ -126,7 +126,7 @@ test("who signs out is out, here and at the provider", async () => {
 
 test("an answer that this tab has not asked for lets nobody in", async () => {
   const { page } = await open(await planner.browse(), "/?code=stolen&state=guessed");
-  await page.getByRole("alert").getByText("This tab has begun no login").waitFor();
+  await page.getByRole("alert").getByText("No login was started").waitFor();
   expect(page.url()).toBe(`${planner.url}/`);
   await signIn(page, "emil");
 });
@@ -219,10 +219,10 @@ test("a follow link needs no login, shows its end, and is over when its maker en
   expect(await seriousFindings(follower)).toEqual([]);
 
   await page.getByRole("button", { name: "End links" }).click();
-  await page.getByText("all links have ended").waitFor();
-  await follower.getByText("The link has expired, or was ended.").waitFor();
+  await page.getByText("all links were revoked").waitFor();
+  await follower.getByText("The link has expired or was revoked.").waitFor();
   const { page: late } = await openPage(stranger, url);
-  await late.getByRole("alert").getByText("The link has expired, or was ended.").waitFor();
+  await late.getByRole("alert").getByText("The link has expired or was revoked.").waitFor();
   expect([...faults, ...theirs]).toEqual([]);
 });
 

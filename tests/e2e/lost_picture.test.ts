@@ -9,7 +9,7 @@ import { type Hook, Planner, moved, openCase, openPage, seriousFindings, state, 
 
 // The browser may take the graphics card away at any time. What is exported then is the picture or a sentence, never a blank.
 
-const LOST = "The browser took the graphics card away";
+const LOST = "The browser lost access to the graphics card";
 const LEAST_SHARE = 0.05;
 
 let planner: Planner;
@@ -146,7 +146,7 @@ describe("an export from a lost picture", () => {
     await page.locator(".notice").getByText("there is no picture: reload the page").waitFor();
     expect(await page.locator(".report").count()).toBe(0);
     const moves = page.waitForEvent("download");
-    await page.getByRole("button", { name: "File that moves" }).click();
+    await page.getByRole("button", { name: "Moving file" }).click();
     await moves;
     const mesh = page.waitForEvent("download");
     await page.getByRole("button", { name: "Face STL" }).click();

@@ -81,20 +81,20 @@ describe("the hand-made face", () => {
 
   test("opens its jaw by one slider, and keeps the plan closed", async () => {
     const { page } = opened;
-    await open(page, "Jaw and bite");
+    await open(page, "Jaw and occlusion");
     const before = (await state(page)).moves;
-    await page.getByLabel("Opening of the jaw").fill("20");
+    await page.getByLabel("Jaw rotation (hinge axis)").fill("20");
     await page.getByText(/Open by 20\.0°, 1\d\.\d mm between the incisors/).waitFor();
     expect((await state(page)).moves).toEqual(before);
-    await page.getByRole("button", { name: "Show the bite" }).click();
+    await page.getByRole("button", { name: "Show occlusal contacts" }).click();
     await page.getByText("The teeth lie more than 6 mm from each other.").waitFor();
-    await page.locator(".legend").getByText("Distance of upper and lower teeth, mm").waitFor();
+    await page.locator(".legend").getByText("Distance between upper and lower teeth, mm").waitFor();
     expect(await page.locator(".legend .ticks span").allInnerTexts()).toEqual(["6.0", "3.0", "0.0"]);
     const canTake = () => page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.gizmo.controls.enabled as boolean);
     expect(await canTake()).toBe(false);
     await page.getByRole("button", { name: "Close", exact: true }).click();
     await page.getByText("Closed as planned").waitFor();
-    await open(page, "Jaw and bite");
+    await open(page, "Jaw and occlusion");
     await page.locator(".legend").waitFor({ state: "hidden" });
     expect(await canTake()).toBe(true);
   });
@@ -192,7 +192,7 @@ describe("the bundled head", () => {
     const planned = (await state(page)).moves;
     await page.getByLabel("or a place").selectOption({ label: "Chin" });
     await expect.poll(() => forwardOf(page, "Chin").inputValue()).toMatch(/^[3-7]\.\d$/);
-    await page.getByText("This is the face as planned").waitFor();
+    await page.getByText("This is the planned face").waitFor();
     expect((await state(page)).moves).toEqual(planned);
     await page.getByRole("button", { name: "Remove the target for Chin" }).click();
     // This case has the scanner's axes alone.
@@ -229,8 +229,8 @@ describe("the bundled head", () => {
     await page.getByText("The face that is shown is not the plan’s.").waitFor();
     const stored = page.locator("[data-measure=e_line_lower_lip] .band");
     await expect.poll(() => stored.innerText()).toMatch(/ to /);
-    await page.getByLabel("From one to the other").fill("0.5");
-    await page.getByText("no band of it is known").waitFor();
+    await page.getByLabel("Blend between the two").fill("0.5");
+    await page.getByText("it has no 95 % interval").waitFor();
     await page.getByText("Back to the plan").click();
     await stored.waitFor();
     await open(page, "Report");

@@ -84,7 +84,7 @@ const isOther = (asked: string, name: string) => asked !== url(name) && !asked.s
 
 const answered = (page: Opened) => page.waitForFunction(() => ((globalThis as unknown as Hook).tissueform?.moving?.answered ?? 0) > 0);
 const alertOf = (page: Page) => page.getByRole("alert").textContent();
-const hasNotice = (text: string) => text.includes("Not a medical device") && text.includes("A face identifies");
+const hasNotice = (text: string) => text.includes("Not a medical device") && text.includes("This file shows an identifiable face");
 
 /** All segments moved and turned by sliders' numbers; resolves with poses and positions once the picture follows them. */
 async function moveAndRead(page: Opened): Promise<{ poses: number[][]; positions: number[] }> {
@@ -191,7 +191,7 @@ describe("in Chromium", () => {
     await page.getByRole("checkbox").check();
     await page.getByRole("group", { name: "Legend of the map" }).waitFor();
     await page.getByText("Model: gradient field. Made by tissueform").waitFor();
-    await page.getByText("band of uncertainty of this model or pose is not known").waitFor();
+    await page.getByText("No 95 % interval for this model or pose").waitFor();
     expect(await seriousFindings(page)).toEqual([]);
   });
 
@@ -209,13 +209,13 @@ describe("in Chromium", () => {
       const far = { rotationVector: [0, 0, 0.9], pivotMm: [0, 0, 0], translationMm: [0, 0, 0], scale: 1 };
       plan.setPoses(new Map([[plan.handles[0].name, far]]));
     });
-    await page.getByText("Beyond what this file can answer").waitFor();
+    await page.getByText("Outside the prepared range").waitFor();
     expect(hasNotice((await page.locator("#notice").textContent()) ?? "")).toBe(true);
   });
 
   test.each([
-    ["WebAssembly", "delete globalThis.WebAssembly; delete globalThis.Worker", "no thread of its own and no WebAssembly"],
-    ["workers", "delete globalThis.Worker", "no thread of its own: it"],
+    ["WebAssembly", "delete globalThis.WebAssembly; delete globalThis.Worker", "no background thread and no WebAssembly"],
+    ["workers", "delete globalThis.Worker", "no background thread: it"],
   ])("without %s it moves all the same, and says that it is slower", async (_, before, said) => {
     const { page, errors } = await openPage("face.html", before);
     await answered(page as Opened);
@@ -255,7 +255,7 @@ describe("in Chromium", () => {
       const file = `${kind} ${name}.html`;
       writeFileSync(path(file), damage(readFileSync(path(`${kind}.html`), "utf8")));
       const { page } = await openPage(file);
-      await expect.poll(() => alertOf(page)).toContain("damaged or not complete");
+      await expect.poll(() => alertOf(page)).toContain("damaged or incomplete");
       expect(hasNotice((await page.locator("#notice").textContent()) ?? "")).toBe(true);
     }
   });
@@ -414,7 +414,7 @@ describe("from the planner", () => {
     await typeMove(page, "Forward", "5");
     await page.waitForFunction(() => (globalThis as any).tissueform.bench.local.heldColumns !== null);
     const download = page.waitForEvent("download");
-    await page.getByRole("button", { name: "File that moves" }).click();
+    await page.getByRole("button", { name: "Moving file" }).click();
     await (await download).saveAs(path("planner.html"));
     expect((await download).suggestedFilename()).toBe("tissueform-moves.html");
     expect(faults).toEqual([]);
@@ -444,11 +444,11 @@ describe("from the planner", () => {
     await page.waitForFunction(() => (globalThis as any).tissueform.bench.local.heldColumns !== null);
     const password = page.getByLabel("Password");
     await password.fill("short");
-    await page.getByRole("button", { name: "File that moves" }).click();
+    await page.getByRole("button", { name: "Moving file" }).click();
     await page.getByText("at least 8 letters").waitFor();
     await password.fill(PASSWORD);
     const download = page.waitForEvent("download");
-    await page.getByRole("button", { name: "File that moves" }).click();
+    await page.getByRole("button", { name: "Moving file" }).click();
     await (await download).saveAs(path("planner locked.html"));
     const opened = await openPage("planner locked.html");
     await opened.page.getByLabel("password").fill(PASSWORD);

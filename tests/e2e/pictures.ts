@@ -52,10 +52,10 @@ test("seven pictures", async () => {
   await picture(page, "skin-over-bone");
   await page.getByLabel("Opacity of the skin").fill("1");
 
-  await page.getByLabel("Colours show").selectOption({ label: "Movement of the skin" });
-  await page.getByLabel("Colours show").scrollIntoViewIfNeeded();
+  await page.getByLabel("Color by").selectOption({ label: "Movement of the skin" });
+  await page.getByLabel("Color by").scrollIntoViewIfNeeded();
   await picture(page, "map");
-  await page.getByLabel("Colours show").selectOption({ label: "Skin as it looks" });
+  await page.getByLabel("Color by").selectOption({ label: "Skin color" });
 
   await page.getByLabel("Name of the prediction").fill("Jaw 8 mm forward");
   await page.locator(".store button").click();
@@ -65,8 +65,8 @@ test("seven pictures", async () => {
   await page.locator(".store button").click();
   await page.locator(".predictions li", { hasText: "chin up" }).waitFor();
   await page.getByRole("button", { name: "Compare Jaw 8 mm forward" }).click();
-  await page.getByRole("group", { name: "Comparison" }).getByLabel("From", { exact: true }).selectOption({ label: "The face at rest" });
-  await page.getByLabel("From one to the other").fill("0.6");
+  await page.getByRole("group", { name: "Comparison" }).getByLabel("From", { exact: true }).selectOption({ label: "Pre-op face" });
+  await page.getByLabel("Blend between the two").fill("0.6");
   await page.locator(".comparison").scrollIntoViewIfNeeded();
   await picture(page, "comparison");
   await page.getByText("Back to the plan").click();
@@ -114,12 +114,12 @@ test("measures, a target, the band and the bite", async () => {
 
   await page.getByText("Linear elastic", { exact: true }).click();
   await page.locator("[data-measure=e_line_lower_lip] .band").waitFor();
-  await page.getByLabel("Colours show").selectOption({ label: "Band of uncertainty" });
+  await page.getByLabel("Color by").selectOption({ label: "95 % interval (material)" });
   await page.locator(".legend").waitFor({ state: "visible" });
   await page.getByRole("button", { name: "3/4" }).click();
   await toTop("Measures");
   await picture(page, "band");
-  await page.getByLabel("Colours show").selectOption({ label: "Skin as it looks" });
+  await page.getByLabel("Color by").selectOption({ label: "Skin color" });
   await open("Measures");
 
   await page.getByRole("button", { name: "Reset" }).click();
@@ -149,14 +149,14 @@ test("measures, a target, the band and the bite", async () => {
   await open("Soft-tissue targets");
   await page.getByRole("button", { name: "Rest shape" }).click();
 
-  await open("Jaw and bite");
+  await open("Jaw and occlusion");
   await typeMove(page, "Forward", "6");
   await typeMove(page, "Up", "3");
   await page.getByRole("button", { name: "3/4" }).click();
-  await page.getByRole("button", { name: "Show the bite" }).click();
+  await page.getByRole("button", { name: "Show occlusal contacts" }).click();
   await page.getByText(/Contact on about|No contact/).waitFor();
   await page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.stage.zoom(0.75));
-  await toTop("Jaw and bite");
+  await toTop("Jaw and occlusion");
   await picture(page, "bite");
 }, 300_000);
 
@@ -236,7 +236,7 @@ test.each([["phone", 390, 844], ["tablet", 820, 1180]])("on a %s, the planner an
   await takeSegment(page, "Lower jaw");
   await typeMove(page, "Forward", "8");
   await moved(page, 6, 12);
-  await page.getByLabel("Colours show").selectOption({ label: "Movement of the skin" });
+  await page.getByLabel("Color by").selectOption({ label: "Movement of the skin" });
   await page.locator("aside").evaluate((panel) => (panel.scrollTop = 0));
   await picture(page, name);
   const { page: moving } = await openPage(await planner.browse([], device), pathToFileURL(planner.exportHead(true)).href);

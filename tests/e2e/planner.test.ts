@@ -51,7 +51,7 @@ describe("a planner", () => {
   test("tells what is no number, and what is beyond the limits", async () => {
     const { page } = opened;
     await typeMove(page, "Up", "a lot");
-    await page.getByText("is no number of millimetres").waitFor();
+    await page.getByText("enter a number in millimeters").waitFor();
     await typeMove(page, "Up", "999");
     await page.getByText("up is limited to").waitFor();
     await typeMove(page, "Up", "0");
@@ -97,20 +97,20 @@ describe("a planner", () => {
 
   test("lays a map with a legend upon the skin", async () => {
     const { page } = opened;
-    await page.getByLabel("Colours show").selectOption({ label: "Movement of the skin" });
+    await page.getByLabel("Color by").selectOption({ label: "Movement of the skin" });
     await page.locator(".legend").waitFor({ state: "visible" });
     const { legend } = await state(page);
     expect(legend?.largestMm).toBeGreaterThan(6);
     await page.locator(".legend").getByText(/^largest \d+\.\d\d mm, in 95 of 100 cases \d+\.\d\d to \d+\.\d\d$/).waitFor();
     expect(legend?.mostMm).toBeGreaterThanOrEqual(legend?.largestMm ?? Infinity);
-    await page.getByLabel("Colours show").selectOption({ label: "Difference to Gradient field" });
+    await page.getByLabel("Color by").selectOption({ label: "Difference to Gradient field" });
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title === "Difference to Gradient field");
     expect((await state(page)).legend?.largestMm).toBeLessThan(8);
-    await page.getByLabel("Colours show").selectOption({ label: "Band of uncertainty" });
-    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title.startsWith("Band of 95 in 100"));
+    await page.getByLabel("Color by").selectOption({ label: "95 % interval (material)" });
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title.startsWith("95 % interval"));
     await page.locator(".legend").getByText("stiffness only; excludes model and surgical error").waitFor();
     expect((await state(page)).legend?.largestMm).toBeGreaterThan(0.05);
-    await page.getByLabel("Colours show").selectOption({ label: "Skin as it looks" });
+    await page.getByLabel("Color by").selectOption({ label: "Skin color" });
     await page.locator(".legend").waitFor({ state: "hidden" });
   });
 
@@ -120,8 +120,8 @@ describe("a planner", () => {
     await page.locator(".store button").click();
     await page.locator(".predictions li", { hasText: "Eight <b>forward</b>" }).waitFor();
     await page.getByRole("button", { name: "Compare Eight" }).click();
-    await page.getByRole("group", { name: "Comparison" }).getByLabel("From", { exact: true }).selectOption({ label: "The face at rest" });
-    const share = page.getByLabel("From one to the other");
+    await page.getByRole("group", { name: "Comparison" }).getByLabel("From", { exact: true }).selectOption({ label: "Pre-op face" });
+    const share = page.getByLabel("Blend between the two");
     await share.fill("0");
     await moved(page, 0, 0.05);
     await share.fill("0.5");
@@ -186,7 +186,7 @@ describe("a planner", () => {
 });
 
 describe("a whole head", () => {
-  test("has bone that stays, teeth that go along, and landmarks that tell how far", async () => {
+  test("has fixed bone, teeth that go along, and landmarks that tell how far", async () => {
     const { page, faults } = await openCase(await planner.browse(), planner, planner.packWholeHead());
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "8");
@@ -208,10 +208,10 @@ describe("a whole head", () => {
     // Its points are those of the closed jaw.
     const seesPoints = () => page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.points.get("penetration").visible as boolean);
     expect(await seesPoints()).toBe(true);
-    await page.locator("summary").getByText("Jaw and bite", { exact: true }).click();
-    await page.getByLabel("Opening of the jaw").fill("5");
+    await page.locator("summary").getByText("Jaw and occlusion", { exact: true }).click();
+    await page.getByLabel("Jaw rotation (hinge axis)").fill("5");
     expect(await seesPoints()).toBe(false);
-    await page.locator("summary").getByText("Jaw and bite", { exact: true }).click();
+    await page.locator("summary").getByText("Jaw and occlusion", { exact: true }).click();
     await expect.poll(seesPoints).toBe(true);
     await typeMove(page, "Up", "0");
     await page.locator(".warning").waitFor({ state: "hidden" });
@@ -219,7 +219,7 @@ describe("a whole head", () => {
   });
 });
 
-describe("who follows", () => {
+describe("Follow link", () => {
   test("sees the same bytes as the planner, two of them, and the bone where it is", async () => {
     const context = await planner.browse();
     const { page, faults } = await openCase(context, planner);
@@ -246,7 +246,7 @@ describe("who follows", () => {
     expect(await follower.locator("aside").count()).toBe(0);
     await second.close();
     await follower.close();
-    await page.getByText("nobody follows").waitFor();
+    await page.getByText("no followers").waitFor();
     expect([...faults, ...theirs]).toEqual([]);
   });
 });
@@ -295,7 +295,7 @@ describe("a server", () => {
     await typeMove(page, "Forward", "5");
     await moved(page, 3, 7);
     await planner.killServer();
-    await page.getByText("Connecting again").waitFor();
+    await page.getByText("Reconnecting").waitFor();
     await typeMove(page, "Forward", "8");
     await planner.startServer();
     await live(page);
@@ -306,7 +306,7 @@ describe("a server", () => {
   test("that drains says so, and its successor goes on", async () => {
     const { page, faults } = await openCase(await planner.browse(), planner);
     planner.drainServer();
-    await page.getByText("The server is about to end").waitFor();
+    await page.getByText("The server is shutting down").waitFor();
     await planner.drained();
     await planner.startServer();
     await live(page);

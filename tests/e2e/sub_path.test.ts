@@ -62,7 +62,7 @@ describe.skipIf(!hasNginx)("a planner below a path", () => {
     await follower.page.close();
 
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.local.heldColumns !== null);
-    const [file] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "File that moves" }).click()]);
+    const [file] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Moving file" }).click()]);
     expect(readFileSync((await file.path()) ?? "", "utf8")).toContain("<!doctype html>");
 
     await page.reload();

@@ -18,7 +18,7 @@ describe.each(["light", "dark"] as const)("in %s colours axe-core finds nothing 
     await live(page);
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "3");
-    await page.getByLabel("Colours show").selectOption({ label: "Movement of the skin" });
+    await page.getByLabel("Color by").selectOption({ label: "Movement of the skin" });
     await page.locator(".legend").waitFor({ state: "visible" });
     expect(await seriousFindings(page)).toEqual([]);
   });
@@ -34,7 +34,7 @@ test("everything is done by keys alone", async () => {
     }
     throw new Error(`nothing called ${name} is reached by Tab`);
   };
-  await focusOn("Head in three dimensions");
+  await focusOn("3D view of the head");
   await page.keyboard.press("n");
   for (let i = 0; i < 8; ++i) await page.keyboard.press("w");
   await moved(page, 2.5, 5);

@@ -156,7 +156,7 @@ describe("on a line with delay", () => {
     await page.getByRole("radio", { name: /^Neo-Hookean/ }).check();
     await ready(page, await modelOf(page, "neo_hookean"));
     await typeMove(page, "Forward", "12");
-    await page.getByText("Beyond what was prepared: the server answers.").waitFor();
+    await page.getByText("Outside the prepared range: the server answers.").waitFor();
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.picture.value.summary?.prepared === false);
     await typeMove(page, "Forward", "1");
     await page.getByText("This page answers at once; the server confirms.").waitFor();
@@ -190,7 +190,7 @@ describe("on a line with delay", () => {
 
 test.each([
   ["WebAssembly", "javascript", "This page answers at once (without WebAssembly: slower); the server confirms."],
-  ["Worker", "webassembly", "This page answers at once (without a thread of its own: slower); the server confirms."],
+  ["Worker", "webassembly", "This page answers at once (without a background thread: slower); the server confirms."],
 ])("a browser without %s answers, too", async (missing, kernel, words) => {
   const context = await planner.browse();
   await context.addInitScript((name) => {

@@ -52,7 +52,7 @@ class AccessCommandTest : public ServedCliTest {
 TEST_F(AccessCommandTest, WithoutLoginsOneIsNobodyByName) {
   const ProcessResult result = Ask({"whoami"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("nobody by name"));
+  EXPECT_THAT(result.out, HasSubstr("(unnamed)"));
 }
 
 TEST_F(AccessCommandTest, WhatIsSharedIsListedUntilItIsTakenBack) {

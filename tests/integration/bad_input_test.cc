@@ -111,7 +111,7 @@ TEST_F(BadUploadTest, ChunksThatCannotBe) {
   ExpectRefused([](auto& m) { m[1].mutable_chunk()->set_write_offset(1); }, Code::kInvalidArgument,
                 "without gaps");
   ExpectRefused([](auto& m) { m[1].mutable_chunk()->mutable_data()->push_back('x'); },
-                Code::kInvalidArgument, "past the end");
+                Code::kInvalidArgument, "exceeds");
   ExpectRefused([](auto& m) { m[1].mutable_chunk()->mutable_data()->pop_back(); },
                 Code::kInvalidArgument, "send the rest");
   ExpectRefused([](auto& m) { m[1].mutable_chunk()->set_finish_write(false); },
@@ -183,7 +183,7 @@ class BadSessionTest : public BadInputTest {
 TEST_F(BadSessionTest, MeshesThatAreNotThere) {
   ExpectRefused([](auto& r) { r.mesh = "meshes/" + std::string(64, '0'); }, Code::kNotFound,
                 "upload");
-  ExpectRefused([](auto& r) { r.mesh = "face.vtu"; }, Code::kInvalidArgument, "name of a mesh");
+  ExpectRefused([](auto& r) { r.mesh = "face.vtu"; }, Code::kInvalidArgument, "invalid mesh name");
 }
 
 TEST_F(BadSessionTest, StiffnessThatIsNotPositive) {
@@ -323,7 +323,7 @@ TEST_F(BadStreamTest, MessagesOutOfOrder) {
   ExpectRefused({Pose(1)}, Code::kInvalidArgument, "first message must be the configuration");
   ExpectRefused({v1::DeformRequest()}, Code::kInvalidArgument, "first message must be");
   ExpectRefused({configuration_, configuration_}, Code::kInvalidArgument, "second configuration");
-  ExpectRefused({configuration_, v1::DeformRequest()}, Code::kInvalidArgument, "without content");
+  ExpectRefused({configuration_, v1::DeformRequest()}, Code::kInvalidArgument, "an empty message");
   ExpectRefused({configuration_, Pose(2), Pose(2)}, Code::kInvalidArgument, "sequence 2 after 2");
   ExpectRefused({configuration_, Pose(2), Pose(1)}, Code::kInvalidArgument, "sequence 1 after 2");
   ExpectRefused({configuration_, Ack(1)}, Code::kInvalidArgument,
@@ -351,7 +351,7 @@ TEST_F(BadStreamTest, ConfigurationsThatCannotBe) {
   refused([](auto& c) { c.mutable_vertices()->mutable_list(); }, "empty");
   refused([](auto& c) { c.mutable_vertices()->mutable_list()->add_vertices(1 << 20); },
           "vertex 1048576");
-  refused([](auto& c) { c.set_session("mine"); }, "name of a session");
+  refused([](auto& c) { c.set_session("mine"); }, "invalid session name");
 }
 
 TEST_F(BadStreamTest, EndedBeforeItBegan) {

@@ -85,7 +85,7 @@ def main():
                 break
         if address is None:
             sys.exit(f"no address: {told}")
-        if f"port {DEFAULT_PORT} is taken; the planner gets a free one" not in told:
+        if f"port {DEFAULT_PORT} is in use; the planner uses a free one" not in told:
             sys.exit(f"the demo does not say that its port is taken: {told}")
         check_planner(address.group(1))
     finally:

@@ -109,7 +109,7 @@ TEST_F(DoctorTest, AGoodServerWithTlsAndLogins) {
               AllOf(HasSubstr("TLSv1.3, certificate of localhost"), HasSubstr("days left"),
                     HasSubstr("issued by CN=Test authority; ALPN selected h2"),
                     HasSubstr("of alice, from "), HasSubstr("lasts 60 min"),
-                    HasSubstr("the server knows you as alice"), HasSubstr("clock"),
+                    HasSubstr("you are logged in as alice"), HasSubstr("clock"),
                     HasSubstr("dragged and deleted")));
 }
 
@@ -131,7 +131,7 @@ TEST_F(DoctorTest, PlainTextToATlsPort) {
 
 TEST_F(DoctorTest, TlsToAPlainPort) {
   ExpectEndsWith(AskDoctor({.address = name(), .options = {.tls_ca = own_.roots}}), "encryption",
-                 "does not speak TLS", "leave --tls");
+                 "does not speak TLS", "omit --tls");
 }
 
 TEST_F(DoctorTest, AnUnknownAuthority) {
@@ -145,7 +145,7 @@ TEST_F(DoctorTest, AnotherName) {
   StartServer(TlsServer(authority_.IssueFiles(
       folder_, "named", {.alternatives = "DNS:planner.example.org,DNS:planner"})));
   ExpectEndsWith(AskDoctor({.address = name(), .options = {.tls_ca = own_.roots}}), "encryption",
-                 "planner.example.org, planner and not for localhost", "connect by a name");
+                 "planner.example.org, planner and not for localhost", "connect using a name");
 }
 
 TEST_F(DoctorTest, AnExpiredCertificate) {
@@ -202,8 +202,8 @@ std::vector<RefusedToken> RefusedTokens() {
           {"NotYetValid",
            "nbf",
            [] { return SecondsFromNow(300); },
-           {"begins in "},
-           "another login changes nothing"},
+           {"becomes valid in "},
+           "logging in again does not help"},
           {"Issuer",
            "iss",
            [] { return "https://sts.example/1/"; },
@@ -213,7 +213,7 @@ std::vector<RefusedToken> RefusedTokens() {
            "aud",
            [] { return "another"; },
            {"\"another\"", "\"tissueform\""},
-           "the same login again changes nothing"}};
+           "the same login again does not help"}};
 }
 
 class DoctorRefusedTokenTest : public DoctorTest,
@@ -240,7 +240,7 @@ TEST_F(DoctorTest, NoTokenWhereOneIsAskedFor) {
   ServerOptions options = TestOptions();
   options.tokens = tokens.Options();
   StartServer(options);
-  ExpectEndsWith(AskDoctor({.address = name()}), "login", "no token came", "tissueform login");
+  ExpectEndsWith(AskDoctor({.address = name()}), "login", "no token", "tissueform login");
 }
 
 TEST_F(DoctorTest, ATokenOfAnotherProviderNamesTheServersOwn) {
@@ -284,7 +284,7 @@ TEST_P(DoctorOldProxyTest, IsNamedWithWhatAlpnSelects) {
 
 INSTANTIATE_TEST_SUITE_P(
     Proxies, DoctorOldProxyTest,
-    ::testing::Values(OldProxy{"WithoutAlpn", {"passing"}, "selects no protocol"},
+    ::testing::Values(OldProxy{"WithoutAlpn", {"passing"}, "does not select a protocol"},
                       OldProxy{"OfHttp1", {"passing", "http/1.1"}, "selects http/1.1"},
                       OldProxy{"OfHttp1Strictly", {"refusing", "http/1.1"}, "selects http/1.1"}),
     [](const auto& test) { return std::string(test.param.name); });

@@ -50,29 +50,29 @@ class DragCommandTest : public ServedCliTest {
 TEST_F(DragCommandTest, AnswersEveryPoseHereToo) {
   const ProcessResult drag = Drag(kBarFolder + "plan.json", {"--local"});
   EXPECT_THAT(drag, Succeeds());
-  EXPECT_THAT(drag.out, AllOf(ContainsRegex("answered here, too: [1-9][0-9]* columns, [0-9.]+ MB"),
-                              HasSubstr("5 poses, "), HasSubstr("answered here: 5 poses, 0 beyond"),
-                              ContainsRegex("prepared; [0-9.]+ ms \\(p50\\)")));
+  EXPECT_THAT(drag.out,
+              AllOf(ContainsRegex("also answered locally: [1-9][0-9]* columns, [0-9.]+ MB"),
+                    HasSubstr("5 poses, "), HasSubstr("answered locally: 5 poses, 0 beyond"),
+                    ContainsRegex("prepared; [0-9.]+ ms \\(p50\\)")));
 }
 
 TEST_F(DragCommandTest, AnswersNothingHereUnlessAsked) {
   const ProcessResult drag = Drag(kBarFolder + "plan.json", {});
   EXPECT_THAT(drag, Succeeds());
-  EXPECT_THAT(drag.out, AllOf(HasSubstr("5 poses, "), Not(HasSubstr("answered here"))));
+  EXPECT_THAT(drag.out, AllOf(HasSubstr("5 poses, "), Not(HasSubstr("answered locally"))));
 }
 
 TEST_F(DragCommandTest, CountsPosesThatTheServerAloneAnswers) {
   const ProcessResult drag = Drag(Changed({{"[0, 0, 45]", "[0, 0, 400]"}}), {"--local"});
   EXPECT_THAT(drag, Succeeds());
   EXPECT_THAT(drag.out,
-              ContainsRegex("answered here: [1-4] poses, [1-4] beyond what was prepared"));
+              ContainsRegex("answered locally: [1-4] poses, [1-4] beyond the prepared range"));
 }
 
 TEST_F(DragCommandTest, AModelWithoutPreparedAnswersIsRefusedInOneLine) {
   const ProcessResult drag =
       Drag(Changed({{"\"model\": \"gradient_field\"", "\"model\": \"arap\""}}), {"--local"});
-  EXPECT_THAT(drag,
-              FailsWith(1, HasSubstr("no prepared answers to evaluate here; leave --local out")));
+  EXPECT_THAT(drag, FailsWith(1, HasSubstr("no prepared answers; omit --local")));
 }
 
 }  // namespace

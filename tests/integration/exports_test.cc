@@ -102,7 +102,7 @@ TEST_F(ExportsTest, AnExportIsWhatWasAskedAndGoesForwardOnly) {
   EXPECT_NE(changed.etag(), made.etag());
   EXPECT_THAT(exports().Update(storing), SaidBecause(ErrorReason::kStaleEtag));
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_WAITING)),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not follow")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("invalid change of state")));
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORED)), IsOk());
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORED)), IsOk()) << "again";
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_FAILED)),
@@ -114,10 +114,10 @@ TEST_F(ExportsTest, APatientWhoIsAnotherOneByThenIsSeenAnewWhileItIsStored) {
   ASSERT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORING)), IsOk());
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_CONFIRMATION)), IsOk());
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_WAITING)),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not follow")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("invalid change of state")));
   ASSERT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORED)), IsOk());
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_CONFIRMATION)),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not follow")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("invalid change of state")));
 }
 
 TEST_F(ExportsTest, OneOfAPredictionThatIsNotDoneIsGivenAgainAndADoneOneIsNot) {
@@ -153,13 +153,13 @@ TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
   };
   v1::Measure bad = SomeMeasure("Hans Meier");
   refused(bad, "measure 1 has a name");
-  refused(SomeMeasure(), "the name of one before");
+  refused(SomeMeasure(), "an earlier name");
   bad = SomeMeasure("other");
   bad.set_title("Meier\n");
   refused(bad, "title");
   bad = SomeMeasure("other");
   bad.set_unit("inch");
-  refused(bad, "neither mm nor deg");
+  refused(bad, "other than mm and deg");
   bad = SomeMeasure("other");
   bad.set_after(std::numeric_limits<double>::quiet_NaN());
   refused(bad, "not finite");
@@ -177,7 +177,7 @@ TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
   EXPECT_THAT(exports().Create("predictions/none"), SaidBecause(ErrorReason::kPredictionNotFound));
   EXPECT_THAT(exports().Create("none"), StatusIs(absl::StatusCode::kInvalidArgument));
   EXPECT_THAT(exports().Create(Predict(3, "")),
-              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("of no case")));
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("has no case")));
   EXPECT_THAT(exports().Get("exports/none"), SaidBecause(ErrorReason::kExportNotFound));
   EXPECT_THAT(exports().Delete("exports/none"), SaidBecause(ErrorReason::kExportNotFound));
   ASSERT_OK_AND_ASSIGN(const auto all, exports().List());

@@ -184,15 +184,15 @@ TEST_F(PlanServiceTest, BadRequestsAreRefusedInALineThatNamesTheCulprit) {
   EXPECT_THAT(with([](auto* r) { r->set_session("sessions/0123456789abcdef"); }),
               StatusIs(kNotFound));
   EXPECT_THAT(with([](auto* r) { r->clear_targets(); }),
-              StatusIs(kInvalidArgument, HasSubstr("no target")));
+              StatusIs(kInvalidArgument, HasSubstr("no targets")));
   EXPECT_THAT(with([](auto* r) { r->clear_freedoms(); }),
-              StatusIs(kInvalidArgument, HasSubstr("nothing may move")));
+              StatusIs(kInvalidArgument, HasSubstr("no free numbers")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(1)->clear_position_mm(); }),
               StatusIs(kInvalidArgument, HasSubstr("\"point 1\" wants nothing")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(1)->clear_point_mm(); }),
               StatusIs(kInvalidArgument, HasSubstr("\"point 1\" is nowhere")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(1)->set_name("point 0"); }),
-              StatusIs(kInvalidArgument, HasSubstr("two of that name")));
+              StatusIs(kInvalidArgument, HasSubstr("name is not unique")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(0)->mutable_point_mm()->set_x(500); }),
               StatusIs(kInvalidArgument, HasSubstr("off the skin")));
   EXPECT_THAT(with([](auto* r) {

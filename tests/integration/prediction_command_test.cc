@@ -66,7 +66,7 @@ TEST_F(PredictionCommandTest, TitleAndCaseAreKeptAndListed) {
   const Json told = Json::parse(Prediction({"show", titled, "--json"}).out);
   EXPECT_EQ(told["title"], "Chin 8 mm");
   EXPECT_EQ(told["case"], "cases/" + digest);
-  EXPECT_THAT(Prediction({"list", "--case", "none"}), FailsWith(1, HasSubstr("name of a case")));
+  EXPECT_THAT(Prediction({"list", "--case", "none"}), FailsWith(1, HasSubstr("invalid case name")));
 }
 
 TEST_F(PredictionCommandTest, WhatIsSentIsListedAndTakenBack) {
@@ -80,7 +80,7 @@ TEST_F(PredictionCommandTest, WhatIsSentIsListedAndTakenBack) {
   EXPECT_THAT(Prediction({"unsend", name}), Succeeds());
   EXPECT_THAT(Prediction({"sent"}).out, HasSubstr("\n0 exports\n"));
   EXPECT_THAT(Prediction({"unsend", name}), FailsWith(1, HasSubstr("no export")));
-  EXPECT_THAT(Prediction({"send", Create({})}), FailsWith(1, HasSubstr("of no case")));
+  EXPECT_THAT(Prediction({"send", Create({})}), FailsWith(1, HasSubstr("has no case")));
 }
 
 TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
@@ -194,7 +194,7 @@ TEST_F(PredictionCommandTest, RangesOfThePlanGiveAnExportTheBandThatDeformGives)
   Write("plan.json", plan.dump());
   const ProcessResult changed = Prediction(exporting);
   EXPECT_EQ(changed.exit_code, 0);
-  EXPECT_THAT(changed.err, HasSubstr("its uncertainty from the material is not told"));
+  EXPECT_THAT(changed.err, HasSubstr("its material uncertainty is omitted"));
   ASSERT_OK_AND_ASSIGN(const TetMeshFile without, ReadTetMesh(Path("after.vtu")));
   EXPECT_EQ(FindAttribute(without.point_data, kArray), nullptr);
 }
@@ -226,7 +226,7 @@ TEST_F(PredictionCommandTest, PicturesWithoutAnythingToShowAreRefused) {
   const std::string name = Create({});
   EXPECT_THAT(Prediction({"export", name}), FailsWith(1, HasSubstr("--png")));
   EXPECT_THAT(Prediction({"export", name, "--png", "pictures"}),
-              FailsWith(1, HasSubstr("names no case")));
+              FailsWith(1, HasSubstr("has no case to draw")));
   const std::string lost = Create({"--case", std::string(64, 'c')});
   EXPECT_EQ(Prediction({"export", lost, "--png", "pictures"}).exit_code, 1);
   std::filesystem::create_directory(Path("full"));

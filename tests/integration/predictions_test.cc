@@ -148,8 +148,8 @@ TEST_F(PredictionsTest, ACaseOrTitleThatIsNoneIsRefused) {
     EXPECT_THAT(calls().Create(session_.name(), TopPose(SomePose(1)), {}, "", label),
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(why)));
   };
-  refused({.case_name = "cases/of a patient"}, "not the name of a case");
-  refused({.case_name = session_.mesh()}, "not the name of a case");
+  refused({.case_name = "cases/of a patient"}, "invalid case name");
+  refused({.case_name = session_.mesh()}, "invalid case name");
   refused({.title = std::string(257, 'x')}, "256");
   refused({.title = "\x1b[2J"}, "control character");
   EXPECT_THAT(calls().List("", "cases/none"), StatusIs(absl::StatusCode::kInvalidArgument));

@@ -220,7 +220,7 @@ TEST_F(ServedCommandTest, AnUploadThatWasBrokenOffGoesOnAndSaysSo) {
                  server->address() + " > " + PathOf("upload") + " 2> " + PathOf("lines")),
       0);
   EXPECT_THAT(Read("lines"),
-              ContainsRegex("the upload goes on: the server has 0.0 of [0-9.]+ MB already"));
+              ContainsRegex("the upload continues: the server has 0.0 of [0-9.]+ MB already"));
   EXPECT_THAT(Read("upload"), HasSubstr(payload.Sha256()));
 }
 
@@ -286,7 +286,7 @@ TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures)
   ASSERT_EQ(RunDemo("--plan " + kChinPlan + " --seconds 0.5"), 0);
   EXPECT_THAT(
       Read("out.txt"),
-      AllOf(HasSubstr("dragging: chin 4 mm forward, over 0.5 s at 60 poses a second"),
+      AllOf(HasSubstr("dragging: chin 4 mm forward, over 0.5 s at 60 poses per second"),
             ContainsRegex("\nchin +[0-9.]+ +[0-9.]+ +[0-9.]+ +[0-9.]+\n"),
             ContainsRegex("\nnose +[0-9.]+"), HasSubstr("gradient_field and linear_elastic"),
             HasSubstr("\nface "), HasSubstr("not a medical device")));
@@ -402,7 +402,7 @@ TEST_F(ServedCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork)
     EXPECT_EQ(Read("err"),
               absl::StrCat("tissueform: ", option.substr(option.rfind("--")), " ", port,
                            ": cannot listen on 127.0.0.1:", port,
-                           ": Address already in use; give another port, or 0 for a free one\n"));
+                           ": Address already in use; use another port, or 0 for a free one\n"));
   }
 }
 
@@ -411,7 +411,7 @@ TEST_F(ServedCommandTest, AProgramThatEndsBeforeItListensIsNamed) {
     EXPECT_THAT(
         ServerProcess::Start(ProgramPath(program), {"--no-such-option"}, kPatience).status(),
         StatusIs(absl::StatusCode::kUnavailable,
-                 StartsWith(std::string(program) + " ended before it listened")));
+                 StartsWith(std::string(program) + " ended before it was ready")));
   }
 }
 

@@ -99,7 +99,7 @@ TEST_F(SessionCommandTest, APlanOfAnotherMeshAndAStaleEtagAreRefused) {
               FailsWith(1, AllOf(HasSubstr("the plan's mesh has"), HasSubstr("same mesh"))));
   EXPECT_THAT(Update({"--regions", "none.json"}), FailsWith(1, HasSubstr("none.json")));
   EXPECT_THAT(Update({"--regions", "regions.json", "--allow-outside", "--etag", "stale"}),
-              FailsWith(1, HasSubstr("changed in the meantime")));
+              FailsWith(1, HasSubstr("has changed")));
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client_->GetSession(session_->name()));
   EXPECT_EQ(session.etag(), etag);
   EXPECT_THAT(session.handles(), ElementsAre("tip"));

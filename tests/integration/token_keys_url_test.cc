@@ -157,13 +157,13 @@ TEST_P(BadUrlTest, IsRefusedBeforeAnybodyIsAsked) {
 
 INSTANTIATE_TEST_SUITE_P(
     Urls, BadUrlTest,
-    ::testing::Values(BadUrl{"PlainHttp", "http://login.example/keys", "must be https"},
-                      BadUrl{"LooksLikeLoopback", "http://127.0.0.1.example/k", "must be https"},
+    ::testing::Values(BadUrl{"PlainHttp", "http://login.example/keys", "must use https"},
+                      BadUrl{"LooksLikeLoopback", "http://127.0.0.1.example/k", "must use https"},
                       BadUrl{"HidesItsHost", "http://localhost@evil.example/k", "password"},
-                      BadUrl{"File", "file:///etc/passwd", "must be https"},
-                      BadUrl{"Ftp", "ftp://login.example/keys", "must be https"},
+                      BadUrl{"File", "file:///etc/passwd", "must use https"},
+                      BadUrl{"Ftp", "ftp://login.example/keys", "must use https"},
                       BadUrl{"WithPassword", "https://a:b@login.example/keys", "password"},
-                      BadUrl{"NoUrl", "keys.json", "no URL"}, BadUrl{"Empty", "", "no URL"}),
+                      BadUrl{"NoUrl", "keys.json", "not a URL"}, BadUrl{"Empty", "", "not a URL"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(JwksUrlTest, HttpsAndLoopbackAreTaken) {

@@ -29,10 +29,10 @@ def forget_hounsfield(image, _):
 
 # How a series is spoilt, and what is said of it.
 SPOILT = {
-    "slices twice at one place": (put_twice, "passed_over", "1 images lie where another one lies"),
-    "two patients in one series": (give_another_patient, "failed", "its images say different things of their patient"),
-    "an MR": (make_magnetic, "passed_over", "it is of modality MR, which has no Hounsfield units"),
-    "a cone-beam CT without Hounsfield units": (forget_hounsfield, "passed_over", "it does not say how its values become Hounsfield units"),
+    "slices twice at one place": (put_twice, "passed_over", "1 images have the position of another one"),
+    "two patients in one series": (give_another_patient, "failed", "its images name different patients"),
+    "an MR": (make_magnetic, "passed_over", "its modality is MR, which has no Hounsfield units"),
+    "a cone-beam CT without Hounsfield units": (forget_hounsfield, "passed_over", "it has no Hounsfield calibration"),
 }
 
 

@@ -240,7 +240,7 @@ def check_deleted_study(programs, studies, case):
     confirm(programs, export)
     programs.wait_for("an export that has failed", lambda: export_states(programs).get(export) == "failed", needs="bridge")
     notes = [entry["note"] for entry in programs.bridge_status()["exports"] if entry["name"] == export]
-    check("of a study that was deleted nothing is stored, and the bridge says so", len(notes) == 1 and "the series of this case no" in notes[0], str(notes))
+    check("of a study that was deleted nothing is stored, and the bridge says so", len(notes) == 1 and "no longer has the series of this case" in notes[0], str(notes))
 
     def told():
         lines = [line for line in programs.tissueform("prediction", "sent").stdout.splitlines() if line.startswith(export)]

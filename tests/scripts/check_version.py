@@ -23,13 +23,21 @@ def stated_versions(root):
     yield "client/web/package-lock.json, packages", lock["packages"][""]["version"]
     released = re.search(r"^## \[(\d[^\]]*)\]", (root / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     yield "CHANGELOG.md, newest heading", released[1] if released else "none"
-    wanted = re.search(r"find_package\(tissueform ([\d.]+)", (root / "docs/examples/drag/CMakeLists.txt").read_text(encoding="utf-8"))
-    yield "docs/examples/drag/CMakeLists.txt", f"{wanted[1]}.0" if wanted else "none"
+
+
+def requested_versions(root):
+    """(file, major.minor) of every example that finds the package: an example works with each patch release."""
+    for name in ("docs/examples/drag/CMakeLists.txt", "docs/command-line.md"):
+        for version in re.findall(r"find_package\(tissueform ([\d.]+)", (root / name).read_text(encoding="utf-8")):
+            yield name, version
 
 
 def main():
     version = re.search(r"^project\(tissueform VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"), re.MULTILINE)[1]
     wrong = [f"{name}: {other}, but CMakeLists.txt states {version}" for name, other in stated_versions(ROOT) if other != version]
+    minor = version.rpartition(".")[0]
+    wrong += [f"{name}: find_package asks for {other}, but CMakeLists.txt states {version}; write {minor}"
+              for name, other in requested_versions(ROOT) if other != minor]
     print("\n".join(wrong) if wrong else version)
     return 1 if wrong else 0
 

@@ -6,7 +6,7 @@
   tests/scripts/time_gateway.py BUILD [--seconds S] [--rate HZ] [--idle N] [--requests-per-second R]
 
 Starts a server and a gateway of the build folder. "Round trip" is from a pose's sending to its frame, one pose at a time;
-"picture age" is now minus the sending of the newest pose that was shown, every 10 ms, at --rate poses a second, and the interval of
+"frame age" is now minus the sending of the newest pose that was shown, every 10 ms, at --rate poses per second, and the interval of
 the poses is part of it. The others are --idle WebSockets with a watch in which nothing happens, and R requests a second by h2load
 (Debian's nghttp2-client). Needs python3-websockets, python3-grpcio and python3-protobuf: run it by Debian's /usr/bin/python3.
 """
@@ -243,12 +243,12 @@ def start_requests(url, rate, seconds, folder):
 async def measure(server, url, session, arguments, folder):
     told("round trip by gRPC", await round_trips_by_grpc(server, session, arguments.seconds))
     told("round trip through the gateway", await round_trips_by_gateway(url, session, arguments.seconds))
-    told("picture age through the gateway", await picture_ages(url, session, arguments.seconds, arguments.rate))
+    told("frame age through the gateway", await picture_ages(url, session, arguments.seconds, arguments.rate))
     sockets = await idle_sockets(url, small_session(server), arguments.idle)
     requests = start_requests(url, arguments.requests_per_second, arguments.seconds + 1, folder)
     ages = await picture_ages(url, session, arguments.seconds, arguments.rate)
     out, _ = await asyncio.to_thread(requests.communicate)
-    told(f"picture age beside {len(sockets)} idle sockets and {arguments.requests_per_second} requests a second", ages)
+    told(f"frame age beside {len(sockets)} idle sockets and {arguments.requests_per_second} requests a second", ages)
     print(*(line for line in out.splitlines() if line.startswith(("finished", "status", "time for request"))), sep="\n")
     open_ones = sum(socket.open for socket in sockets)
     print(f"idle sockets that are open at the end: {open_ones}")

@@ -25,14 +25,14 @@ struct VerifyOptions {
 };
 
 void AddKeygen(CLI::App& audit, CommandWork* work) {
-  CLI::App* command = audit.add_subcommand("keygen", "make the key of an audit log");
+  CLI::App* command = audit.add_subcommand("keygen", "create the key of an audit log");
   auto path = std::make_shared<std::string>();
   command->add_option("FILE", *path, "a new file, which gets mode 0600")->required();
   command->callback([path, work] {
     *work = [path] {
       TF_RETURN_IF_ERROR(AuditKey::WriteNew(*path));
       std::cout << "key written to " << *path
-                << "; keep a copy where the server's machine cannot reach it\n";
+                << "; keep a copy out of reach of the server's machine\n";
       return absl::OkStatus();
     };
   });
@@ -45,7 +45,7 @@ absl::Status Verify(const VerifyOptions& options) {
     TF_ASSIGN_OR_RETURN(checkpoints, ReadCheckpoints(options.checkpoints));
     if (checkpoints.empty()) {
       return absl::InvalidArgumentError(
-          absl::StrCat(options.checkpoints, ": holds no checkpoint of an audit log"));
+          absl::StrCat(options.checkpoints, ": no checkpoint of an audit log"));
     }
   }
   TF_ASSIGN_OR_RETURN(const AuditReport report, VerifyAuditFiles(options.files, key, checkpoints));
@@ -57,14 +57,14 @@ absl::Status Verify(const VerifyOptions& options) {
   std::cout << "ok: " << report.lines << " lines in " << report.files
             << " files, n=" << report.first << " to n=" << report.last.number << "\n";
   if (report.mended > 0) {
-    std::cout << "crashes: " << report.mended << " torn lines were set aside by the server\n";
+    std::cout << "crashes: " << report.mended << " incomplete lines were set aside by the server\n";
   }
   if (report.lost > 0) {
     std::cout << "lost: the server notes " << report.lost
-              << " times that lines found no room; look for \"event\":\"lost\"\n";
+              << " times that lines were lost; look for \"event\":\"lost\"\n";
   }
   if (checkpoints.empty()) {
-    std::cout << "without --checkpoints nobody can tell whether lines are missing after n="
+    std::cout << "without --checkpoints, missing lines cannot be detected after n="
               << report.last.number << "\n";
   } else {
     std::cout << "checkpoints: " << checkpoints.size() << " compared\n";
@@ -73,13 +73,13 @@ absl::Status Verify(const VerifyOptions& options) {
 }
 
 void AddVerify(CLI::App& audit, CommandWork* work) {
-  CLI::App* command = audit.add_subcommand(
-      "verify",
-      "tell whether the files of an audit log are what the server wrote, or the first "
-      "line that is not, and how");
+  CLI::App* command =
+      audit.add_subcommand("verify",
+                           "verify the files of an audit log, or report the first changed "
+                           "line and how");
   auto options = std::make_shared<VerifyOptions>();
-  command->add_option("FILE", options->files, "files of one log, in any order")->required();
-  command->add_option("--key", options->key, "the key by which the server sealed them")
+  command->add_option("FILE", options->files, "files of one audit log, in any order")->required();
+  command->add_option("--key", options->key, "the key of the server's audit log")
       ->type_name("FILE")
       ->required();
   command

@@ -56,12 +56,12 @@ bool IsGraphic(absl::string_view text) {
 // Why a provider that names itself `found` is not the one of --issuer. Bounded: it is the peer's.
 absl::Status AnotherIssuer(const std::string& found, const std::string& expected) {
   if (found.empty() || found.size() > kMaxIssuerBytes || !IsGraphic(found)) {
-    return NoAnswer("names no issuer");
+    return NoAnswer("does not name an issuer");
   }
   if (absl::StrContains(found, '{')) {
     return absl::DataLossError(
         absl::StrCat("the identity provider's issuer is ", found,
-                     ", which stands for every tenant; give the address of your own tenant by "
+                     ", shared by all tenants; pass your tenant's address with "
                      "--issuer, not ",
                      expected));
   }
@@ -72,7 +72,8 @@ absl::Status AnotherIssuer(const std::string& found, const std::string& expected
 
 absl::StatusOr<nlohmann::json> ObjectOf(const HttpAnswer& answer) {
   nlohmann::json json = nlohmann::json::parse(answer.body, nullptr, false);
-  if (!json.is_object()) return NoAnswer(absl::StrCat("(", answer.status, ") is no JSON object"));
+  if (!json.is_object())
+    return NoAnswer(absl::StrCat("(", answer.status, ") is not a JSON object"));
   return json;
 }
 
@@ -83,12 +84,12 @@ std::string ErrorOf(const nlohmann::json& json) {
                        std::all_of(error.begin(), error.end(), [](char letter) {
                          return absl::ascii_islower(letter) || letter == '_';
                        });
-  return is_word ? error : "no known error";
+  return is_word ? error : "an unknown error";
 }
 
 absl::Status Refused(const std::string& error) {
-  return absl::PermissionDeniedError(absl::StrCat(
-      "the identity provider has refused the login: ", error, "; ask whoever runs it"));
+  return absl::PermissionDeniedError(
+      absl::StrCat("the identity provider refused the login: ", error, "; ask its administrator"));
 }
 
 absl::StatusOr<LoginTokens> TokensOf(const nlohmann::json& json) {
@@ -98,7 +99,7 @@ absl::StatusOr<LoginTokens> TokensOf(const nlohmann::json& json) {
   if (tokens.access_token.empty() || tokens.access_token.size() > kMaxLoginTokenBytes ||
       tokens.refresh_token.size() > kMaxLoginTokenBytes || !IsGraphic(tokens.access_token) ||
       !IsGraphic(tokens.refresh_token)) {
-    return NoAnswer("holds no token");
+    return NoAnswer("has no token");
   }
   return tokens;
 }
@@ -148,7 +149,7 @@ absl::StatusOr<DeviceLogin::Endpoints> DeviceLogin::Discover() {
 absl::StatusOr<DeviceLogin::Begun> DeviceLogin::Begin(const std::string& endpoint) {
   if (endpoint.empty()) {
     return absl::FailedPreconditionError(
-        "the identity provider has no device flow; use a browser's planner, or a token file of its "
+        "the identity provider has no device flow; use the planner, or a token file of its "
         "own");
   }
   TF_RETURN_IF_ERROR(CheckLoginUrl("the provider's device endpoint", endpoint));
@@ -163,11 +164,11 @@ absl::StatusOr<DeviceLogin::Begun> DeviceLogin::Begin(const std::string& endpoin
                             .complete_url = TextOf(json, "verification_uri_complete"),
                             .lifetime = SecondsOf(json, "expires_in", kCodeLifetime)},
                  .interval = SecondsOf(json, "interval", kInterval)};
-  TF_RETURN_IF_ERROR(CheckLoginUrl("where the provider sends its user", begun.prompt.url));
+  TF_RETURN_IF_ERROR(CheckLoginUrl("the provider's login URL", begun.prompt.url));
   if (!CheckLoginUrl("", begun.prompt.complete_url).ok()) begun.prompt.complete_url.clear();
   if (begun.device_code.empty() || begun.prompt.user_code.empty() ||
       begun.prompt.user_code.size() > kMaxUserCodeBytes || !IsGraphic(begun.prompt.user_code)) {
-    return NoAnswer("holds no code");
+    return NoAnswer("has no code");
   }
   return begun;
 }
@@ -189,7 +190,7 @@ absl::StatusOr<LoginTokens> DeviceLogin::Poll(const std::string& endpoint, const
     if (error == "expired_token") break;
     if (error != "slow_down" && error != "authorization_pending") return Refused(error);
   }
-  return absl::DeadlineExceededError("nobody has entered the code in time; begin again");
+  return absl::DeadlineExceededError("the code was not entered in time; start again");
 }
 
 absl::StatusOr<LoginTokens> DeviceLogin::Run(

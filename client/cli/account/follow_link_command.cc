@@ -38,7 +38,7 @@ absl::Status MakeLink(const LinkOptions& options) {
                       client->access().CreateFollowLink(FullName("sessions", options.session),
                                                         case_name, lifetime));
   absl::PrintF("%s\n", link.token());
-  absl::FPrintF(stderr, "until %s; whoever has it may watch the session\n",
+  absl::FPrintF(stderr, "until %s; anyone with the link can watch the session\n",
                 TimeText(link.expire_time()));
   return absl::OkStatus();
 }
@@ -64,12 +64,11 @@ void AddFollowLinkCommands(CLI::App& session, CommandWork* work) {
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
     return sub;
   };
-  CLI::App* link =
-      add("link", "make a token with which anybody may watch it, and nothing else", MakeLink);
-  link->add_option("--hours", options->hours, "after which it ends (default: 8)")
+  CLI::App* link = add("link", "create a link for watching it", MakeLink);
+  link->add_option("--hours", options->hours, "until it expires (default: 8)")
       ->check(CLI::Range(1, kMaxHours));
-  link->add_option("--case", options->case_name, "the case that a follower's page needs, too");
-  add("unlink", "end all its follow links, and the watches that stand on them", EndLinks);
+  link->add_option("--case", options->case_name, "the case for the follower's page");
+  add("unlink", "revoke all its follow links and their watches", EndLinks);
 }
 
 }  // namespace tissueform

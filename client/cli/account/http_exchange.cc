@@ -59,7 +59,7 @@ std::string Encoded(CURL* curl, const HttpForm& form) {
 
 absl::StatusOr<HttpAnswer> Exchange(const HttpRequest& request) {
   const Curl curl(curl_easy_init(), &curl_easy_cleanup);
-  if (curl == nullptr) return absl::InternalError("libcurl cannot be set up");
+  if (curl == nullptr) return absl::InternalError("libcurl cannot be initialized");
   HttpAnswer answer;
   const std::string body = Encoded(curl.get(), request.form);
   curl_easy_setopt(curl.get(), CURLOPT_URL, request.url.c_str());
@@ -75,7 +75,7 @@ absl::StatusOr<HttpAnswer> Exchange(const HttpRequest& request) {
   if (code != CURLE_OK) {
     return absl::UnavailableError(absl::StrCat(
         "the identity provider ", PartOf(request.url, CURLUPART_HOST),
-        " cannot be asked: ", curl_easy_strerror(code), "; check --issuer and the network"));
+        " cannot be reached: ", curl_easy_strerror(code), "; check --issuer and the network"));
   }
   long status = 0;
   curl_easy_getinfo(curl.get(), CURLINFO_RESPONSE_CODE, &status);
@@ -89,7 +89,7 @@ HttpExchange CurlExchange() {
   static const bool ready = curl_global_init(CURL_GLOBAL_DEFAULT) == CURLE_OK;
   if (!ready) {
     return [](const HttpRequest&) -> absl::StatusOr<HttpAnswer> {
-      return absl::InternalError("libcurl cannot be set up");
+      return absl::InternalError("libcurl cannot be initialized");
     };
   }
   return &Exchange;
@@ -104,7 +104,7 @@ absl::Status CheckLoginUrl(const std::string& what, const std::string& url) {
   if (!printable || url.size() > kMaxUrlBytes || host.empty() || !safe ||
       !PartOf(url, CURLUPART_USER).empty()) {
     return absl::InvalidArgumentError(absl::StrCat(
-        what, " is no URL to log in at: https://HOST[:PORT][/PATH] is needed (http on loopback)"));
+        what, " is not a login URL: use https://HOST[:PORT][/PATH] (http on loopback)"));
   }
   return absl::OkStatus();
 }

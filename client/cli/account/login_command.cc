@@ -35,7 +35,7 @@ struct LoginOptions {
 void PrintPrompt(const DevicePrompt& prompt) {
   absl::PrintF("Open  %s\nenter %s\n", prompt.url, prompt.user_code);
   if (!prompt.complete_url.empty()) absl::PrintF("or open %s\n", prompt.complete_url);
-  absl::PrintF("within %d minutes; waiting for you there\n",
+  absl::PrintF("within %d minutes; waiting\n",
                std::chrono::ceil<std::chrono::minutes>(prompt.lifetime).count());
   // The user waits for these lines, also where the output is a pipe.
   std::fflush(stdout);
@@ -45,7 +45,7 @@ absl::StatusOr<std::string> PathOf(const LoginOptions& options) {
   const std::string path = options.token_file.empty() ? DefaultTokenPath() : options.token_file;
   if (path.empty()) {
     return absl::FailedPreconditionError(
-        "neither XDG_CONFIG_HOME nor HOME is set: say where the token lies by --token-file");
+        "neither XDG_CONFIG_HOME nor HOME is set: pass --token-file");
   }
   return path;
 }
@@ -64,8 +64,9 @@ void PrintClockFault(const std::string& token) {
   const TokenState state = TokenStateAt((*shown)["claims"], now);
   if (state.date != TokenDate::kNotYetValid && state.date != TokenDate::kEnded) return;
   absl::PrintF(
-      "the new token %s by this machine's clock: this clock, or the provider's, is wrong; set both "
-      "by NTP\n",
+      "the new token %s by this machine's clock: either this clock or the provider's is wrong; "
+      "synchronize both "
+      "with NTP\n",
       state.words);
 }
 
@@ -80,7 +81,7 @@ absl::Status Keep(const std::string& path, const LoginClient& client, const Logi
   PrintClockFault(tokens.access_token);
   if (tokens.refresh_token.empty()) {
     absl::PrintF(
-        "it cannot be renewed: the identity provider gave no refresh token; see --scope\n");
+        "it cannot be renewed: the identity provider returned no refresh token; see --scope\n");
   }
   return absl::OkStatus();
 }
@@ -100,14 +101,14 @@ absl::Status Logout(const LoginOptions& options) {
   TF_ASSIGN_OR_RETURN(const std::string path, PathOf(options));
   TF_ASSIGN_OR_RETURN(const bool was_there, RemoveLogin(path));
   absl::PrintF("%s\n",
-               was_there ? absl::StrCat("logged out; removed ", path) : "nobody was logged in");
+               was_there ? absl::StrCat("logged out; removed ", path) : "you were not logged in");
   return absl::OkStatus();
 }
 
 void AddTokenFile(CLI::App* command, LoginOptions* options) {
   command
       ->add_option("--token-file", options->token_file,
-                   "the file of the token, for its owner alone (default: "
+                   "token file, readable by its owner only (default: "
                    "$XDG_CONFIG_HOME/tissueform/token)")
       ->type_name("FILE")
       ->envname("TISSUEFORM_TOKEN_FILE");
@@ -121,28 +122,30 @@ void AddLoginCommand(CLI::App& app, CommandWork* work) {
   CLI::Option* issuer = command->add_option("--issuer", options->client.issuer,
                                             "the identity provider: https, or http on loopback");
   issuer->type_name("URL");
-  CLI::Option* client = command->add_option("--client-id", options->client.client_id,
-                                            "the command's name at the provider, a public client");
+  CLI::Option* client =
+      command->add_option("--client-id", options->client.client_id,
+                          "client id of the command at the provider, a public client");
   client->type_name("ID")->needs(issuer);
   issuer->needs(client);
   command
       ->add_option("--audience", options->client.audience,
-                   "for whom the token is: what the server's --token-audience says")
+                   "audience of the token: the server's --token-audience")
       ->type_name("AUDIENCE");
   command
       ->add_option("--scope", options->client.scopes,
-                   "scopes that are asked for; some providers renew with offline_access only")
+                   "requested scopes; some providers renew only with offline_access")
       ->capture_default_str()
       ->type_name("SCOPES");
-  CLI::Option* renew = command->add_flag("--renew", options->renew,
-                                         "another token, without asking anybody, by what the last "
-                                         "login left");
+  CLI::Option* renew =
+      command->add_flag("--renew", options->renew,
+                        "renew the token without a user, with the data of the last "
+                        "login");
   renew->excludes(issuer);
   AddTokenFile(command, options.get());
   command->footer(
-      "Shows an address and a code: open the one in any browser, enter the other and log in "
+      "Shows an address and a code: open the address in any browser, enter the code and log in "
       "there.\n"
-      "The token lies in a file that only you may read; the commands that speak with a server send "
+      "The token is stored in a file that only you can read; commands with --server send "
       "it.\n\n"
       "Example:\n"
       "  tissueform login --issuer https://login.example.org/realms/clinic --client-id tissueform\n"
@@ -161,8 +164,9 @@ void AddLogoutCommand(CLI::App& app, CommandWork* work) {
   CLI::App* command = app.add_subcommand(kLogoutCommand.name, kLogoutCommand.description);
   AddTokenFile(command, options.get());
   command->footer(
-      "The token is removed from this machine. Where it is known elsewhere it is good until it "
-      "ends;\nthe server's list of revocations ends it at once.\n\nExample:\n  tissueform logout");
+      "The token is removed from this machine. Copies elsewhere stay valid until it "
+      "expires;\nthe server's revocation list revokes it at once.\n\nExample:\n  tissueform "
+      "logout");
   command->callback([options, work] { *work = [options] { return Logout(*options); }; });
 }
 

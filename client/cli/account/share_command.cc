@@ -69,23 +69,23 @@ void AddShareCommand(CLI::App& app, CommandWork* work) {
     CLI::App* sub = command->add_subcommand(name, what);
     sub->add_option("RESOURCE", options->resource,
                     "\"sessions/{id}\", \"predictions/{id}\", \"cases/{sha256}\", or "
-                    "\"projects/{name}\": all that one has in the project")
+                    "\"projects/{name}\": all your resources in the project")
         ->required();
     if (needs_principal) {
-      sub->add_option("PRINCIPAL", options->principal, "who, by the name that `whoami` tells them")
+      sub->add_option("PRINCIPAL", options->principal, "principal, as shown by `whoami`")
           ->required();
     }
     AddServerOption(sub, &options->server);
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
     return sub;
   };
-  add("add", "let somebody look at it, or drag it; again: with this role", true, AddShare)
+  add("add", "grant or change a share", true, AddShare)
       ->add_option("--role", options->role,
-                   "viewer: look, watch, read predictions; planner: drag and predict, too")
+                   "viewer: read and watch; planner: also drag and predict")
       ->check(CLI::IsMember({"viewer", "planner"}))
       ->capture_default_str();
-  add("list", "with whom it is shared", false, ListShares);
-  add("remove", "take it back; streams that stand on it end", true, RemoveShare);
+  add("list", "list the shares", false, ListShares);
+  add("remove", "revoke a share and end the streams that rely on it", true, RemoveShare);
   command->footer(
       "Example:\n  tissueform share add sessions/0123456789abcdef ann --role planner --server "
       "localhost:50051");

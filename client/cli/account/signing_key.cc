@@ -83,14 +83,14 @@ SigningKey::SigningKey(SigningKey&& other) noexcept = default;
 absl::StatusOr<SigningKey> SigningKey::MakeP256() {
   auto evp = std::make_unique<Evp>();
   evp->key.reset(EVP_EC_gen("P-256"));
-  if (evp->key == nullptr) return absl::InternalError("OpenSSL makes no key");
+  if (evp->key == nullptr) return absl::InternalError("OpenSSL cannot create a key");
   return SigningKey(std::move(evp));
 }
 
 absl::StatusOr<SigningKey> SigningKey::MakeRsa(int bits) {
   auto evp = std::make_unique<Evp>();
   evp->key.reset(EVP_RSA_gen(static_cast<unsigned int>(bits)));
-  if (evp->key == nullptr) return absl::InternalError("OpenSSL makes no key");
+  if (evp->key == nullptr) return absl::InternalError("OpenSSL cannot create a key");
   return SigningKey(std::move(evp));
 }
 
@@ -101,11 +101,11 @@ absl::StatusOr<SigningKey> SigningKey::FromPem(absl::string_view text) {
   const EVP_PKEY* key = evp->key.get();
   if (key == nullptr) {
     return absl::InvalidArgumentError(
-        "there is no private key in PEM without a password; make one with `tissueform token "
+        "it has no private key in PEM without a password; create one with `tissueform token "
         "keygen`");
   }
   if (!EVP_PKEY_is_a(key, "RSA") && !(EVP_PKEY_is_a(key, "EC") && EVP_PKEY_get_bits(key) == 256)) {
-    return absl::InvalidArgumentError("the key is neither RSA nor on the curve P-256");
+    return absl::InvalidArgumentError("the key is neither RSA nor P-256");
   }
   return SigningKey(std::move(evp));
 }

@@ -27,19 +27,21 @@ void AddKeygen(CLI::App* token, CommandWork* work) {
     int rsa_bits = 0;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      token->add_subcommand("keygen", "make a key that signs tokens, and what servers are told");
-  command->add_option("--out", options->out, "folder for the files; nothing is written over")
+  CLI::App* command = token->add_subcommand("keygen", "create a key pair for signing tokens");
+  command
+      ->add_option("--out", options->out,
+                   "folder for the files; existing files are not overwritten")
       ->required()
       ->type_name("DIR");
   command
       ->add_option("--rsa", options->rsa_bits,
-                   "an RSA key of so many bits (RS256) instead of one of P-256 (ES256)")
+                   "create an RSA key of this size in bits (RS256) instead of P-256 (ES256)")
       ->check(CLI::IsMember({2048, 3072, 4096}));
   command->footer(
       "Writes into DIR:\n"
-      "  private.pem  makes tokens: whoever has it can be anybody. Keep it off the server.\n"
-      "  public.pem, jwks.json  what the server is told, in two forms: --token-keys\n"
+      "  private.pem  signs tokens: anyone who has it can impersonate every user. Keep it off the "
+      "server.\n"
+      "  public.pem, jwks.json  the public key for --token-keys, in two forms\n"
       "Example:\n"
       "  tissueform token keygen --out keys\n"
       "  tissueform-server --token-issuer https://keys.example --token-audience tissueform \\\n"
@@ -47,7 +49,7 @@ void AddKeygen(CLI::App* token, CommandWork* work) {
   command->callback([options, work] {
     *work = [options]() -> absl::Status {
       TF_RETURN_IF_ERROR(MakeKeyFiles(options->out, options->rsa_bits));
-      std::cout << "made private.pem, public.pem and jwks.json in " << options->out << "\n";
+      std::cout << "created private.pem, public.pem and jwks.json in " << options->out << "\n";
       return absl::OkStatus();
     };
   });
@@ -60,30 +62,30 @@ void AddMake(CLI::App* token, CommandWork* work) {
   };
   auto options = std::make_shared<Options>();
   TokenWords& words = options->words;
-  CLI::App* command = token->add_subcommand("make", "make a short-lived token; prints it");
+  CLI::App* command = token->add_subcommand("make", "create a short-lived token and print it");
   command->add_option("--key", options->key, "private.pem of `token keygen`")
       ->required()
       ->type_name("FILE");
   command->add_option("--issuer", words.issuer, "as in the server's --token-issuer")->required();
   command->add_option("--audience", words.audiences, "as in the server's --token-audience")
       ->required();
-  command->add_option("--subject", words.subject, "whose it is: 1 to 128 printable characters")
+  command->add_option("--subject", words.subject, "principal: 1 to 128 printable characters")
       ->required();
   command
       ->add_option(
           "--lifetime", words.lifetime_seconds,
-          absl::StrCat("seconds until it ends, at most ", kMaxTokenLifetimeSeconds, " (12 hours)"))
+          absl::StrCat("lifetime in seconds, at most ", kMaxTokenLifetimeSeconds, " (12 hours)"))
       ->check(CLI::Range(int64_t{1}, kMaxTokenLifetimeSeconds))
       ->capture_default_str();
-  command->add_option("--role", words.roles, "publisher, bridge or admin; again for more")
+  command->add_option("--role", words.roles, "publisher, bridge or admin (repeatable)")
       ->check(CLI::IsMember({"publisher", "bridge", "admin"}));
-  command->add_option("--project", words.projects, "a project that it opens; again for more");
+  command->add_option("--project", words.projects, "a project (repeatable)");
   command->footer(
-      "Keep a token as you keep a password, in a file that only you read:\n"
+      "Protect a token like a password, in a file that only you can read:\n"
       "  (umask 077; tissueform token make --key keys/private.pem --issuer https://keys.example "
       "\\\n"
       "     --audience tissueform --subject alice > token)\n"
-      "It cannot be taken back but by the server's --token-revocations (docs/security.md).");
+      "Only the server's --token-revocations can revoke it (docs/security.md).");
   command->callback([options, work] {
     *work = [options]() -> absl::Status {
       TF_ASSIGN_OR_RETURN(const std::string made, MakeTokenWith(options->key, options->words));
@@ -106,17 +108,17 @@ absl::StatusOr<nlohmann::json> Show(const std::string& path) {
 void AddShow(CLI::App* token, CommandWork* work) {
   auto file = std::make_shared<std::string>();
   CLI::App* command =
-      token->add_subcommand("show", "print what a token says, as JSON, without verifying it");
+      token->add_subcommand("show", "print the contents of a token as JSON, without verification");
   command
       ->add_option("FILE", *file,
-                   "file that holds the token, as `tissueform login` and `token make > FILE` write "
-                   "it; without FILE the token is read from standard input")
+                   "token file, as written by `tissueform login` and `token make > FILE`"
+                   "; without FILE: standard input")
       ->type_name("");
   command->footer(
-      "Shows header and claims, times in words, whether the token is in date, and never its\n"
-      "signature. Nothing is verified: anybody can write what is shown. \"token_digest\" is what\n"
-      "the token is called in a revocation list. A token itself is not an argument, since other\n"
-      "users of a machine see those.\n"
+      "Shows header and claims, times as dates, and whether the token is valid now. The signature\n"
+      "is neither shown nor verified. \"token_digest\" identifies\n"
+      "the token in a revocation list. A token is not an argument, because other\n"
+      "users of a machine can see arguments.\n"
       "Examples:\n"
       "  tissueform token show ~/.config/tissueform/token\n"
       "  tissueform token show < token");
@@ -124,7 +126,7 @@ void AddShow(CLI::App* token, CommandWork* work) {
     *work = [file]() -> absl::Status {
       TF_ASSIGN_OR_RETURN(const nlohmann::json shown, Show(*file));
       std::cout << shown.dump(2, ' ', true) << "\n";
-      std::cerr << "not verified: anybody can write this\n";
+      std::cerr << "not verified\n";
       return absl::OkStatus();
     };
   });
@@ -134,7 +136,7 @@ void AddShow(CLI::App* token, CommandWork* work) {
 
 void AddTokenCommand(CLI::App& app, CommandWork* work) {
   CLI::App* token = app.add_subcommand(
-      "token", "keys and short-lived tokens, for tests and for sites without a provider");
+      "token", "keys and short-lived tokens, for tests and sites without a provider");
   token->require_subcommand(1);
   token->footer(
       "Examples:\n"

@@ -32,7 +32,7 @@ absl::Status MakeOwnFolder(const fs::path& folder) {
   if (folder.empty() || fs::is_directory(folder, error)) return absl::OkStatus();
   fs::create_directories(folder.parent_path(), error);
   if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-    return absl::ErrnoToStatus(errno, absl::StrCat("cannot make the folder ", folder.string()));
+    return absl::ErrnoToStatus(errno, absl::StrCat("cannot create the folder ", folder.string()));
   }
   return absl::OkStatus();
 }
@@ -72,11 +72,11 @@ absl::StatusOr<KeptLogin> ReadLogin(const std::string& path) {
   struct stat facts = {};
   if (stat(renewal.c_str(), &facts) != 0) {
     return absl::NotFoundError(absl::StrCat("nothing to renew: there is no ", renewal,
-                                            "; log in by `tissueform login --issuer URL`"));
+                                            "; log in with `tissueform login --issuer URL`"));
   }
   if ((facts.st_mode & 0077U) != 0) {
     return absl::FailedPreconditionError(
-        absl::StrCat(renewal, " may be read by others: chmod 600 it, or log in again"));
+        absl::StrCat(renewal, " can be read by other users: chmod 600 it, or log in again"));
   }
   std::ifstream file(renewal, std::ios::binary);
   const bool fits = static_cast<uintmax_t>(facts.st_size) <= kMaxFileBytes;

@@ -40,7 +40,7 @@ double SecondsUntil(double time, std::chrono::system_clock::time_point now) {
 
 TokenState TokenStateAt(const nlohmann::json& claims, std::chrono::system_clock::time_point now) {
   const std::optional<double> expires = SecondsOf(claims, "exp");
-  if (!expires.has_value()) return {TokenDate::kWithoutEnd, "without an end (exp)"};
+  if (!expires.has_value()) return {TokenDate::kWithoutEnd, "without an expiry (exp)"};
   const double left = SecondsUntil(*expires, now);
   if (left <= 0) return {TokenDate::kEnded, absl::StrCat("ended ", InWords(-left), " ago")};
   double wait = 0;
@@ -48,7 +48,7 @@ TokenState TokenStateAt(const nlohmann::json& claims, std::chrono::system_clock:
     wait = std::max(wait, SecondsUntil(SecondsOf(claims, name).value_or(0), now));
   }
   if (wait > kLeewaySeconds)
-    return {TokenDate::kNotYetValid, absl::StrCat("begins in ", InWords(wait))};
+    return {TokenDate::kNotYetValid, absl::StrCat("becomes valid in ", InWords(wait))};
   return {TokenDate::kInDate, absl::StrCat("lasts ", InWords(left))};
 }
 

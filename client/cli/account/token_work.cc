@@ -36,8 +36,8 @@ absl::Status WriteNewFile(const std::filesystem::path& path, mode_t mode,
                           const std::string& content) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
   if (file < 0 && errno == EEXIST) {
-    return absl::AlreadyExistsError(absl::StrCat(
-        path.string(), " is there already and stays as it is; delete it or name another folder"));
+    return absl::AlreadyExistsError(
+        absl::StrCat(path.string(), " exists; delete it or name another folder"));
   }
   if (file < 0) return absl::ErrnoToStatus(errno, absl::StrCat("cannot make ", path.string()));
   const ssize_t written = write(file, content.data(), content.size());
@@ -69,7 +69,7 @@ absl::StatusOr<nlohmann::json> ReadPart(absl::string_view part, absl::string_vie
   }
   if (read.is_object()) return read;
   return absl::InvalidArgumentError(
-      absl::StrCat("this is no JSON Web Token: its ", name, " is not JSON in base64url"));
+      absl::StrCat("not a JSON Web Token: its ", name, " is not JSON in base64url"));
 }
 
 }  // namespace
@@ -107,7 +107,7 @@ absl::Status MakeKeyFiles(const std::string& folder, int rsa_bits) {
 absl::StatusOr<std::string> MakeTokenWith(const std::string& key_file, const TokenWords& words) {
   TF_ASSIGN_OR_RETURN(
       const std::string pem,
-      ReadSmallFile(key_file, "make keys with `tissueform token keygen --out DIR`"));
+      ReadSmallFile(key_file, "create keys with `tissueform token keygen --out DIR`"));
   const absl::StatusOr<SigningKey> key = SigningKey::FromPem(pem);
   if (!key.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(key_file, ": ", key.status().message()));
@@ -117,9 +117,8 @@ absl::StatusOr<std::string> MakeTokenWith(const std::string& key_file, const Tok
 
 absl::StatusOr<nlohmann::json> ShowTokenFile(const std::string& path,
                                              std::chrono::system_clock::time_point now) {
-  TF_ASSIGN_OR_RETURN(
-      const std::string text,
-      ReadSmallFile(path, "give the file of a token, as `tissueform login` leaves it"));
+  TF_ASSIGN_OR_RETURN(const std::string text,
+                      ReadSmallFile(path, "give a token file, as written by `tissueform login`"));
   absl::StatusOr<nlohmann::json> shown = ShowToken(absl::StripAsciiWhitespace(text), now);
   if (shown.ok()) return shown;
   return absl::InvalidArgumentError(absl::StrCat(path, ": ", shown.status().message()));
@@ -129,7 +128,7 @@ absl::StatusOr<nlohmann::json> ShowToken(absl::string_view token,
                                          std::chrono::system_clock::time_point now) {
   const std::vector<absl::string_view> parts = absl::StrSplit(token, '.');
   if (parts.size() != 3) {
-    return absl::InvalidArgumentError("this is no JSON Web Token: it does not have three parts");
+    return absl::InvalidArgumentError("not a JSON Web Token: it does not have three parts");
   }
   nlohmann::json shown;
   TF_ASSIGN_OR_RETURN(shown["header"], ReadPart(parts[0], "header"));

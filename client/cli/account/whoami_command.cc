@@ -21,8 +21,7 @@ namespace {
 absl::Status TellWho(const ServerConnection& server) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(server));
   TF_ASSIGN_OR_RETURN(const v1::Caller caller, client->access().WhoAmI());
-  absl::PrintF("principal  %s\n",
-               caller.principal().empty() ? "nobody by name" : caller.principal());
+  absl::PrintF("principal  %s\n", caller.principal().empty() ? "(unnamed)" : caller.principal());
   if (!caller.roles().empty()) absl::PrintF("roles      %s\n", absl::StrJoin(caller.roles(), ", "));
   if (!caller.projects().empty()) {
     absl::PrintF("projects   %s\n", absl::StrJoin(caller.projects(), ", "));

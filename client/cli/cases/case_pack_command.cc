@@ -55,7 +55,7 @@ absl::Status PackCase(const CasePackOptions& options) {
                  surface.triangles.rows());
   }
   if (contents.landmarks.empty()) {
-    absl::PrintF("no %s lies beside the mesh: its own surfaces are shown, without landmarks\n",
+    absl::PrintF("no %s in the mesh's folder: using the mesh's own surfaces, without landmarks\n",
                  kViewerFile);
   }
   absl::PrintF("%d handles, %d landmarks, head frame by %s, %.1f MB: %s\n", contents.handles.size(),
@@ -65,8 +65,8 @@ absl::Status PackCase(const CasePackOptions& options) {
 }
 
 constexpr char kCasePackFooter[] =
-    "A case is one file with all that a planner needs: surfaces, mesh, session, poses, landmarks. "
-    "It is a\nbinary glTF 2.0 file, so that other programs show it, too; docs/case-format.md.\n\n"
+    "A case is one file for the planner: surfaces, mesh, session, poses, landmarks. "
+    "It is a\nbinary glTF 2.0 file, so other programs can show it; see docs/case-format.md.\n\n"
     "It shows the patient's face: treat it like the CT. Not a medical device.\n\n"
     "Examples:\n"
     "  tissueform case pack head/plan.json --out head.tfcase --title \"Lower jaw forward\"\n"
@@ -76,12 +76,11 @@ constexpr char kCasePackFooter[] =
 
 void AddCasePackCommand(CLI::App& command, CommandWork* work) {
   auto options = std::make_shared<CasePackOptions>();
-  CLI::App* pack = command.add_subcommand("pack", "make a case from a plan");
+  CLI::App* pack = command.add_subcommand("pack", "create a case from a plan");
   pack->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
   pack->add_option("--out", options->out, "the case to write, NAME.tfcase")->required();
-  pack->add_option("--title", options->title,
-                   "what a planner shows as its name; left out: the segments");
-  pack->add_flag("--overwrite", options->overwrite, "let --out replace an older file");
+  pack->add_option("--title", options->title, "name shown by the planner (default: the segments)");
+  pack->add_flag("--overwrite", options->overwrite, "replace an existing file");
   AddAllowOutside(pack, &options->reading);
   pack->footer(kCasePackFooter);
   pack->callback([options, work] { *work = [options] { return PackCase(*options); }; });

@@ -45,7 +45,7 @@ absl::StatusOr<Positions> ReadFloatPositions(const std::string& path, int64_t ve
   }
   if (size != static_cast<uintmax_t>(expected)) {
     return absl::InvalidArgumentError(absl::StrCat(
-        path, " has ", size, " bytes, and ", vertices, " vertices of three float32 take ", expected,
+        path, " has ", size, " bytes, and ", vertices, " vertices of three float32 need ", expected,
         "; name the positions of a prediction of this case"));
   }
   std::ifstream stream(path, std::ios::binary);
@@ -63,8 +63,9 @@ absl::StatusOr<HandlePose> PoseOfVertices(const v1::Handle& handle, const Positi
   for (int i = 0; i < count; ++i) {
     const int32_t v = handle.vertices(i);
     if (v < 0 || v >= rest.rows()) {
-      return absl::InvalidArgumentError(absl::StrCat("the session of the case has vertex ", v,
-                                                     ", which its mesh has not; pack it again"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("the case's session refers to vertex ", v,
+                       ", which its mesh does not have; pack the case again"));
     }
     from.col(i) = rest.row(v);
     to.col(i) = deformed.row(v);
@@ -87,7 +88,7 @@ absl::StatusOr<std::map<std::string, HandlePose>> PosesOfHandles(const CaseFile&
                                                                  const Positions& deformed) {
   v1::CreateSessionRequest request;
   if (!request.ParseFromString(contents.session_request)) {
-    return absl::InvalidArgumentError("the case has no session that can be read; pack it again");
+    return absl::InvalidArgumentError("the session of the case cannot be read; pack it again");
   }
   const Positions rest = RestPositions(contents.mesh);
   std::map<std::string, HandlePose> poses;
@@ -105,7 +106,7 @@ absl::Status Render(const CaseRenderOptions& options) {
                       ReadFloatPositions(options.positions, contents.mesh.vertex_count));
   if (!deformed.allFinite()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(options.positions, " holds a position that is no number"));
+        absl::StrCat(options.positions, " has a position that is not a number"));
   }
   TF_ASSIGN_OR_RETURN(const auto poses, PosesOfHandles(contents, deformed));
   TF_ASSIGN_OR_RETURN(const PredictedCase predicted, PredictCase(contents, deformed, poses));
@@ -117,7 +118,7 @@ absl::Status Render(const CaseRenderOptions& options) {
 }
 
 constexpr char kCaseRenderFooter[] =
-    "What `tissueform prediction export --png` draws, without a server.\n\n"
+    "Writes the same pictures as `tissueform prediction export --png`, without a server.\n\n"
     "The pictures show the patient's face: treat them like the CT. Not a medical device.\n\n"
     "Example:\n"
     "  tissueform case render head.tfcase --positions after.f32 --out pictures\n"
@@ -131,11 +132,11 @@ void AddCaseRenderCommand(CLI::App& command, CommandWork* work) {
   render->add_option("CASE", options->file, "the case (docs/case-format.md)")->required();
   render
       ->add_option("--positions", options->positions,
-                   "where the vertices of its mesh go: x, y, z in LPS and mm, float32, "
-                   "little-endian, as ReadPositions gives them")
+                   "positions of its mesh's vertices: x, y, z in LPS and mm, float32, "
+                   "little-endian, as returned by ReadPositions")
       ->required()
       ->type_name("FILE");
-  render->add_option("--out", options->out, "a folder that is empty or not there yet")->required();
+  render->add_option("--out", options->out, "an empty or new folder")->required();
   render->footer(kCaseRenderFooter);
   render->callback([options, work] { *work = [options] { return Render(*options); }; });
 }

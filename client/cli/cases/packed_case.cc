@@ -45,8 +45,8 @@ absl::StatusOr<std::optional<ViewerFile>> FindViewer(const std::string& mesh_pat
   TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256(mesh_path));
   if (viewer.mesh_file_sha256 == mesh_sha256) return viewer;
   return absl::FailedPreconditionError(
-      absl::StrCat(path.string(), " belongs to another mesh than ", mesh_path,
-                   "; build the plan again, or take the file away to show the mesh alone"));
+      absl::StrCat(path.string(), " belongs to a different mesh than ", mesh_path,
+                   "; build the plan again, or remove the file to show only the mesh"));
 }
 
 MeshPayloadView PayloadOf(const CaseMesh& mesh) {

@@ -114,7 +114,7 @@ absl::StatusOr<std::vector<CaseSurface>> SurfacesOfMesh(const PlanProblem& probl
   std::optional<CaseSurface> skin = SkinOfMesh(*problem.mesh, problem.constraints, regions);
   if (!skin) {
     return absl::InvalidArgumentError(
-        "every vertex of the mesh is fixed or moved: no skin to show");
+        "every vertex of the mesh is fixed or moved: there is no skin to show");
   }
   std::vector<CaseSurface> surfaces = {*std::move(skin)};
   for (CaseSurface& segment : SegmentsOfMesh(*problem.mesh, problem.constraints)) {

@@ -30,8 +30,8 @@ absl::StatusOr<std::string> FindWebFolder() {
   const fs::path folder = fs::path(ProgramFolder()).parent_path() / "share/tissueform/web";
   std::error_code ignored;
   if (fs::is_regular_file(folder / "index.html", ignored)) return folder.string();
-  return absl::NotFoundError(absl::StrCat("the planner's pages are not in ", folder.string(),
-                                          "; deploy/build_web.sh builds them"));
+  return absl::NotFoundError(absl::StrCat("the planner's files are not in ", folder.string(),
+                                          "; build them with deploy/build_web.sh"));
 }
 
 }  // namespace

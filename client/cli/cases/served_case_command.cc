@@ -41,7 +41,7 @@ absl::StatusOr<std::string> ReadCaseBytes(const std::string& path) {
   }
   if (size > kMaxCaseBytes) {
     return absl::ResourceExhaustedError(
-        absl::StrCat(path, " has ", size, " bytes; a case may have ", kMaxCaseBytes));
+        absl::StrCat(path, " has ", size, " bytes; the limit of a case is ", kMaxCaseBytes));
   }
   std::string bytes(size, '\0');
   std::ifstream stream(path, std::ios::binary);
@@ -64,7 +64,7 @@ absl::Status Publish(const ServedCaseOptions& options) {
   if (!contents.ok()) {
     return absl::Status(contents.status().code(),
                         absl::StrCat(options.file, ": ", contents.status().message(),
-                                     "; `tissueform case pack` makes cases"));
+                                     "; create cases with `tissueform case pack`"));
   }
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string& title = options.title.empty() ? contents->title : options.title;
@@ -94,14 +94,15 @@ absl::Status Show(const ServedCaseOptions& options) {
 absl::Status Delete(const ServedCaseOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->cases().Delete(options.FullCase()));
-  absl::PrintF("%s is deleted\n", options.FullCase());
+  absl::PrintF("deleted %s\n", options.FullCase());
   return absl::OkStatus();
 }
 
 constexpr char kPublishFooter[] =
-    "The server keeps the file as it is, under the SHA-256 of its bytes, and gives it to planners; "
-    "it is also\ngiven the mesh in it, so that a planner that opens the case need not send it.\n\n"
-    "It shows the patient's face: treat it like the CT. Title and face are seen by all who reach "
+    "The server stores the file under the SHA-256 of its bytes, for planners; "
+    "its\nmesh is uploaded too, so that planners need not send it.\n\n"
+    "It shows the patient's face: treat it like the CT. Without logins, title and face are visible "
+    "to everyone who can reach "
     "the server.\n\n"
     "Example:\n"
     "  tissueform case publish head.tfcase --title \"Lower jaw forward\" --server localhost:50051\n"
@@ -121,15 +122,14 @@ void AddServedCaseCommands(CLI::App& command, CommandWork* work) {
   const auto add_name = [&](CLI::App* sub) {
     sub->add_option("CASE", options->name, "its name, with \"cases/\" or without")->required();
   };
-  CLI::App* publish = add("publish", "give a case to a server, for planners to open", Publish);
+  CLI::App* publish = add("publish", "publish a case to a server, for planners", Publish);
   publish->add_option("FILE", options->file, "the case, NAME.tfcase (docs/case-format.md)")
       ->required();
-  publish->add_option("--title", options->title,
-                      "what lists call it; left out: the title in the file");
+  publish->add_option("--title", options->title, "title in lists (default: the file's title)");
   publish->footer(kPublishFooter);
-  add("list", "the cases of a server", List);
-  add_name(add("show", "what a server knows of a case", Show));
-  add_name(add("delete", "delete a case of a server; sessions and predictions stay", Delete));
+  add("list", "list the cases of a server", List);
+  add_name(add("show", "details of a case on a server", Show));
+  add_name(add("delete", "delete a case from a server; sessions and predictions stay", Delete));
 }
 
 }  // namespace tissueform

@@ -22,7 +22,7 @@ constexpr char kFooter[] =
     "  tissueform compare predicted.vtu reference.vtu --by anatomy --out difference.vtu\n"
     "  tissueform compare plan.json --models gradient_field,arap --csv models.csv\n"
     "  tissueform compare plan.json --reference linear_elastic --out compared\n"
-    "Of a plan the chosen models (all unless said) are run in this process, on one preparation, "
+    "For a plan, the chosen models (default: all) run in this process on one mesh "
     "and\n"
     "compared with the reference. Percentiles are nearest-rank; skin means the boundary's "
     "vertices.";
@@ -38,11 +38,11 @@ void CheckUse(const CLI::App& command, const CompareOptions& options) {
     if (command.count(option) > 0) throw CLI::ValidationError(option, why);
   };
   if (of_models) {
-    refuse("B", "a plan is compared by its models, not with a file");
-    refuse("--by", "is for two results; a plan's regions are its fixed and its handles' vertices");
+    refuse("B", "a plan's models are compared with each other, not with a file");
+    refuse("--by", "applies to two results; a plan's regions are its fixed and handle vertices");
     if (EndsWith(options.out, ".vtu")) {
-      throw CLI::ValidationError(
-          "--out", "models are written into a folder; " + options.out + " looks like a file");
+      throw CLI::ValidationError("--out", "one file per model is written into a folder; " +
+                                              options.out + " looks like a file name");
     }
     return;
   }
@@ -50,7 +50,7 @@ void CheckUse(const CLI::App& command, const CompareOptions& options) {
     throw CLI::ValidationError("B", "is required: two results, or one plan (.json)");
   }
   for (const char* option : {"--models", "--reference", "--solver-threads", "--allow-outside"}) {
-    refuse(option, "is for a plan (.json)");
+    refuse(option, "applies to a plan (.json)");
   }
   if (!options.out.empty() && !EndsWith(options.out, ".vtu")) {
     throw CLI::ValidationError("--out", options.out + " must end with .vtu");
@@ -60,20 +60,18 @@ void CheckUse(const CLI::App& command, const CompareOptions& options) {
 void AddModelOptions(CLI::App* command, CompareOptions* options) {
   command
       ->add_option("--models", options->models,
-                   "of a plan: the models to compare, with commas between them; all unless said")
+                   "for a plan: models to compare, separated by commas (default: all)")
       ->delimiter(',')
       ->check(CLI::IsMember(KnownModelNames()));
-  command
-      ->add_option("--reference", options->reference,
-                   "of a plan: the model that the others are compared with")
+  command->add_option("--reference", options->reference, "for a plan: the reference model")
       ->check(CLI::IsMember(KnownModelNames()))
       ->capture_default_str();
   command
       ->add_option("--threads", options->threads,
-                   "of a plan: threads to compute with; the answer does not depend on it")
+                   "for a plan: number of threads; does not affect the result")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
-  AddSolverThreads(command, "of a plan: ", &options->solver_threads);
+  AddSolverThreads(command, "for a plan: ", &options->solver_threads);
   AddAllowOutside(command, &options->reading);
 }
 
@@ -83,13 +81,15 @@ void AddCompareCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<CompareOptions>();
   options->threads = AvailableProcessors();
   CLI::App* command = app.add_subcommand(
-      "compare", "how far two results, or the models of one plan, lie apart, in mm");
+      "compare", "distance between two results, or between the models of one plan, in mm");
   command->add_option("A", options->a, "a result (.vtu), or a plan (.json)")->required();
   command->add_option("B", options->b, "another result with the same vertices");
-  command->add_option("--by", options->by, "also for each value of this point array of A");
-  command->add_option("--out", options->out,
-                      "of results: write A with point arrays distance_mm and difference_mm (B - A) "
-                      "to this .vtu; of a plan: one such file for each model into this folder");
+  command->add_option("--by", options->by,
+                      "also report each value of this point array of A separately");
+  command->add_option(
+      "--out", options->out,
+      "for results: write A with point arrays distance_mm and difference_mm (B - A) "
+      "to this .vtu; for a plan: one such file per model, into this folder");
   command->add_option("--csv", options->csv, "also write the figures to this file");
   command->add_flag("--json", options->json, "print the figures as JSON");
   AddModelOptions(command, options.get());

@@ -50,8 +50,8 @@ absl::Status CheckOutputs(const CompareOptions& options) {
 absl::StatusOr<TetMeshFile> ReadFiniteMesh(const std::string& path) {
   TF_ASSIGN_OR_RETURN(TetMeshFile file, ReadTetMesh(path));
   if (file.mesh.positions().allFinite()) return file;
-  return absl::InvalidArgumentError(absl::StrCat(
-      "mesh ", path, " has coordinates that are not finite; see tissueform mesh check"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("mesh ", path, " has non-finite coordinates; see tissueform mesh check"));
 }
 
 // One region for each label, in rising order.
@@ -143,7 +143,7 @@ absl::Status Report(const CompareOptions& options, const FileComparison& compari
     if (comparison.within_band) {
       const WithinBand& band = *comparison.within_band;
       absl::PrintF(
-          "B lies within A's material uncertainty (%s) at %.1f %% of the %d free vertices, "
+          "B is within A's material uncertainty (%s) at %.1f %% of the %d free vertices, "
           "elsewhere up to %.3g mm beyond\n",
           kMaterialUncertaintyNotice, 100 * band.share(), band.vertices, band.largest_beyond_mm);
     }

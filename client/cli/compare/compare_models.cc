@@ -76,7 +76,7 @@ absl::Status CheckOutputs(const CompareOptions& options, const std::vector<std::
   std::filesystem::create_directories(options.out, error);
   if (error) {
     return absl::FailedPreconditionError(
-        absl::StrCat("cannot make the folder ", options.out, ": ", error.message()));
+        absl::StrCat("cannot create the folder ", options.out, ": ", error.message()));
   }
   for (const std::string& model : models) {
     TF_RETURN_IF_ERROR(CheckWritable(ResultPath(options, model)));

@@ -54,23 +54,24 @@ void SetDeadline(grpc::ClientContext* context) { context->set_deadline(Deadline(
 std::string AdviceForToken(const std::string& failure) {
   if (failure == "no_token") return "log in (`tissueform login`) or give a token (--token-file)";
   if (failure == "expired") {
-    return "log in again; where the line `token` says that it lasts, or the token is new, set the "
-           "clocks of server and provider by NTP instead";
+    return "log in again; if the line `token` reports a valid token, or the token is new, "
+           "synchronize the "
+           "clocks of server and provider with NTP instead";
   }
   if (failure == "not_yet_valid") {
-    return "set the clocks of server and provider by NTP; another login changes nothing";
+    return "synchronize the clocks of server and provider with NTP; logging in again does not help";
   }
   if (failure == "issuer" || failure == "unknown_key" || failure == "signature") {
-    return "compare the issuer of the line `token` with the server's --token-issuer: log in at "
+    return "compare the issuer in the line `token` with the server's --token-issuer: log in at "
            "that "
-           "one (`tissueform login --issuer URL`), or have the option corrected "
+           "one (`tissueform login --issuer URL`), or correct the option "
            "(docs/operations.md, logins)";
   }
   if (failure == "audience") {
-    return "log in for the server's audience (`tissueform login --audience NAME`), or have the "
-           "server's --token-audience corrected; the same login again changes nothing";
+    return "log in for the server's audience (`tissueform login --audience NAME`), or correct the "
+           "server's --token-audience; the same login again does not help";
   }
-  return "the token cannot be used as it is; docs/security.md says what each reason needs";
+  return "the token is not usable; see docs/security.md for each reason";
 }
 
 std::string AdviceFor(const absl::Status& status) {
@@ -78,17 +79,17 @@ std::string AdviceFor(const absl::Status& status) {
     case absl::StatusCode::kUnauthenticated:
       return AdviceForToken(ErrorInfoOf(status).metadata["token"]);
     case absl::StatusCode::kPermissionDenied:
-      return "ask whoever runs the server for the right to do this";
+      return "ask the server's operator for this right";
     case absl::StatusCode::kResourceExhausted:
-      return "the server, or your share of it, is full: try again later, or delete what you need "
+      return "the server or your quota is full: try again later, or delete what you need "
              "no "
              "more";
     case absl::StatusCode::kUnavailable:
-      return "the server ends, or the connection broke: try again in a minute";
+      return "the server is shutting down, or the connection broke: try again in a minute";
     case absl::StatusCode::kDeadlineExceeded:
-      return "it takes too long: is the server overloaded?";
+      return "timeout: is the server overloaded?";
     default:
-      return "tell whoever runs the server this line";
+      return "report this line to the server's operator";
   }
 }
 
@@ -162,14 +163,14 @@ DoctorLine DoctorCalls::CheckHealth() const {
   const absl::Status status = FromGrpcStatus(done.get_future().get());
   if (!status.ok()) {
     DoctorLine line = FailedCall("health", "", status);
-    line.advice = "something answers, but no tissueform-server: is this its port, or a proxy's?";
+    line.advice = "another program answers, not tissueform-server: is this its port, or a proxy's?";
     return line;
   }
   if (response.status() != grpc::health::v1::HealthCheckResponse::SERVING) {
     return {.check = "health",
             .finding = Finding::kFailed,
-            .text = "the server says NOT_SERVING: it is about to end",
-            .advice = "it takes no new work: try again in a minute, or another server"};
+            .text = "the server reports NOT_SERVING: it is shutting down",
+            .advice = "it accepts no new work: try again in a minute, or use another server"};
   }
   return {.check = "health", .text = "gRPC over HTTP/2, SERVING"};
 }
@@ -184,7 +185,7 @@ bool DoctorCalls::CheckCaller(DoctorReport* report) const {
   if (absl::IsUnimplemented(status)) {
     report->Add({.check = "login",
                  .finding = Finding::kSkipped,
-                 .text = "the server does not tell whom it takes callers for"});
+                 .text = "the server does not report the caller's identity"});
     return true;
   }
   if (!status.ok()) {
@@ -192,12 +193,11 @@ bool DoctorCalls::CheckCaller(DoctorReport* report) const {
     return !absl::IsUnauthenticated(status);
   }
   std::vector<std::string> roles(caller.roles().begin(), caller.roles().end());
-  report->Add(
-      {.check = "login",
-       .text = caller.principal().empty()
-                   ? "the server asks nobody who they are"
-                   : absl::StrCat("the server knows you as ", caller.principal(), ", roles: ",
-                                  roles.empty() ? "none" : absl::StrJoin(roles, ", "))});
+  report->Add({.check = "login",
+               .text = caller.principal().empty()
+                           ? "the server does not require authentication"
+                           : absl::StrCat("you are logged in as ", caller.principal(), ", roles: ",
+                                          roles.empty() ? "none" : absl::StrJoin(roles, ", "))});
   if (!caller.has_server_time()) return true;
   const auto half = (std::chrono::system_clock::now() - asked) / 2;
   const double here = std::chrono::duration<double>((asked + half).time_since_epoch()).count();
@@ -208,7 +208,8 @@ bool DoctorCalls::CheckCaller(DoctorReport* report) const {
                                              skew < 0 ? "behind" : "ahead")};
   if (std::abs(skew) > kNoticedSeconds) {
     line.finding = std::abs(skew) > kLeewaySeconds ? Finding::kFailed : Finding::kWarning;
-    line.advice = "set both clocks by NTP: tokens begin and end by the server's";
+    line.advice =
+        "synchronize both clocks with NTP: the server's clock decides whether a token is valid";
   }
   report->Add(std::move(line));
   return true;
@@ -226,11 +227,11 @@ void DoctorCalls::CheckServer(DoctorReport* report) {
   DoctorLine version = {
       .check = "version",
       .text = absl::StrCat(
-          "server ", info.version(), node.empty() ? "" : absl::StrCat(" (", node, " of a cluster)"),
+          "server ", info.version(), node.empty() ? "" : absl::StrCat(" (", node, " in a cluster)"),
           ", this program ", SoftwareVersion(), ", protocol ", info.api_version())};
   if (info.version() != SoftwareVersion()) {
     version.finding = Finding::kWarning;
-    version.advice = "they understand each other; to have all features install the same version";
+    version.advice = "they are compatible; for all features install the same version";
   }
   report->Add(std::move(version));
   std::map<std::string, int64_t> limits;
@@ -243,7 +244,7 @@ void DoctorCalls::CheckServer(DoctorReport* report) {
   if (info.draining()) {
     report->Add({.check = "limits",
                  .finding = Finding::kFailed,
-                 .text = "the server is about to end and takes no new work",
+                 .text = "the server is shutting down and accepts no new work",
                  .advice = "try again in a minute, or another server"});
   }
 }
@@ -276,10 +277,10 @@ DoctorLine DoctorCalls::CheckWork() {
   Delete(mesh->name(), session.name());
   if (!made.ok()) return FailedCall(kCheck, "session: ", made);
   if (!dragged.ok()) return FailedCall(kCheck, "drag: ", dragged);
-  return {
-      .check = kCheck,
-      .text = absl::StrFormat("two tets uploaded, made a session, dragged and deleted in %.0f ms",
-                              watch.Seconds() * 1e3)};
+  return {.check = kCheck,
+          .text = absl::StrFormat(
+              "uploaded two tets, created a session, dragged and deleted it in %.0f ms",
+              watch.Seconds() * 1e3)};
 }
 
 void DoctorCalls::Delete(const std::string& mesh, const std::string& session) {

@@ -51,7 +51,7 @@ absl::Status Run(const DoctorOptions& options) {
   }
   if (report.failed()) {
     return absl::UnavailableError(
-        absl::StrCat(options.server.address, " cannot be used from here as it is"));
+        absl::StrCat(options.server.address, " cannot be used from here as configured"));
   }
   return absl::OkStatus();
 }
@@ -88,12 +88,12 @@ DoctorReport AskDoctor(const ServerConnection& server) {
 void AddDoctorCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<DoctorOptions>();
   CLI::App* command = app.add_subcommand(kDoctorCommand.name, kDoctorCommand.description);
-  command->add_option("SERVER", options->server.address, "where the server listens, HOST:PORT")
+  command->add_option("SERVER", options->server.address, "address of the server, HOST:PORT")
       ->required();
   AddConnectionOptions(command, &options->server.options);
   command->add_flag("--json", options->json, "print JSON instead of lines");
   command->footer(
-      "Each line says ok or what to do. Exit code 1 when something failed.\n\n"
+      "Each line reports ok or what to do. Exit code 1 if a check failed.\n\n"
       "Example:\n"
       "  tissueform doctor planner.example.org:50051 --tls-ca hospital-ca.pem");
   command->callback([options, work] { *work = [options] { return Run(*options); }; });

@@ -85,14 +85,14 @@ Connection ConnectToAny(const ServerEndpoint& endpoint) {
 
 std::string AdviceFor(int error, const ServerEndpoint& endpoint) {
   if (error == ECONNREFUSED) {
-    return absl::StrCat("nobody listens on port ", endpoint.port,
+    return absl::StrCat("nothing listens on port ", endpoint.port,
                         ": is the server started, and is this its port?");
   }
   if (error == ETIMEDOUT) {
-    return absl::StrCat("nothing answers: a firewall on the way, or the wrong machine; TCP port ",
-                        endpoint.port, " must be let through");
+    return absl::StrCat("no reply: a firewall in between, or the wrong machine; TCP port ",
+                        endpoint.port, " must be open");
   }
-  return "this machine has no route there: check its network, or the VPN";
+  return "this machine has no route to that address: check its network, or the VPN";
 }
 
 }  // namespace
@@ -121,8 +121,8 @@ absl::StatusOr<ServerEndpoint> ParseEndpoint(const std::string& address) {
                     (bracketed || host.find(':') == std::string::npos) &&
                     absl::SimpleAtoi(address.substr(colon + 1), &port) && port > 0 && port <= 65535;
   if (!fine) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("\"", address, "\" is no server; give it as HOST:PORT, IPv6 in brackets"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "\"", address, "\" is not a server address; use HOST:PORT, with IPv6 in brackets"));
   }
   if (bracketed) host = host.substr(1, host.size() - 2);
   return ServerEndpoint{.host = host, .port = absl::StrCat(port)};

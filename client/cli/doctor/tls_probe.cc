@@ -158,9 +158,10 @@ bool PicksHttp1(SSL_CTX* context, const ServerEndpoint& endpoint) {
 
 DoctorLine WithoutHttp2(SSL_CTX* context, const ServerEndpoint& endpoint, const std::string& what) {
   return Failed(
-      absl::StrCat(what, "ALPN did not select HTTP/2 (h2), which gRPC needs; the peer ",
-                   PicksHttp1(context, endpoint) ? "selects http/1.1" : "selects no protocol"),
-      "a proxy on the way ends TLS: have it offer h2 by ALPN (HAProxy: alpn h2; nginx: http2 and "
+      absl::StrCat(
+          what, "ALPN did not select HTTP/2 (h2), which gRPC needs; the peer ",
+          PicksHttp1(context, endpoint) ? "selects http/1.1" : "does not select a protocol"),
+      "a proxy terminates TLS: let it offer h2 by ALPN (HAProxy: alpn h2; nginx: http2 and "
       "grpc_pass), or pass TCP through to the server");
 }
 
@@ -169,41 +170,43 @@ DoctorLine BadCertificate(SSL* ssl, int64_t why, const ServerEndpoint& endpoint)
                                         X509_verify_cert_error_string(why));
   switch (why) {
     case X509_V_ERR_CERT_HAS_EXPIRED:
-      return Failed(
-          absl::StrCat(text, ", ", -DaysLeft(ssl), " days ago"),
-          "whoever runs the server must renew it (--tls-cert); or is this machine's clock "
-          "wrong?");
+      return Failed(absl::StrCat(text, ", ", -DaysLeft(ssl), " days ago"),
+                    "the server's operator must renew it (--tls-cert); or is this machine's clock "
+                    "wrong?");
     case X509_V_ERR_CERT_NOT_YET_VALID:
       return Failed(text, "is this machine's clock wrong?");
     case X509_V_ERR_HOSTNAME_MISMATCH:
     case X509_V_ERR_IP_ADDRESS_MISMATCH:
-      return Failed(absl::StrCat("the server's certificate is for ", NamesOf(ssl), " and not for ",
-                                 endpoint.host, IssuerOf(ssl)),
-                    "connect by a name that it has, or have one made for this name");
+      return Failed(
+          absl::StrCat("the server's certificate is for ", NamesOf(ssl), " and not for ",
+                       endpoint.host, IssuerOf(ssl)),
+          "connect using a name in the certificate, or issue a certificate for this name");
     case X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT:
     case X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN:
     case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT:
     case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY:
     case X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE:
-      return Failed(text,
-                    "give the certificate of the authority that made it: --tls-ca FILE; if you do "
-                    "not know who did, do not go on");
+      return Failed(
+          text,
+          "pass the certificate of the authority that issued it: --tls-ca FILE; if you do "
+          "not know the issuer, do not continue");
     default:
-      return Failed(text, "have a new one made");
+      return Failed(text, "issue a new certificate");
   }
 }
 
 DoctorLine Refused(const std::string& why, const ConnectionOptions& options) {
   if (absl::StrContains(why, "wrong version number") || absl::StrContains(why, "packet length")) {
     return Failed("the port does not speak TLS",
-                  "leave --tls and --tls-ca out if the server is on this machine, or use its "
+                  "omit --tls and --tls-ca if the server is on this machine, or use its "
                   "encrypted port");
   }
-  return Failed(absl::StrCat("no handshake: ", why),
-                options.tls_certificate.empty()
-                    ? "the server may ask for a certificate of yours: --tls-cert and --tls-key"
-                    : "the server does not take this certificate: is it expired, or of another "
-                      "authority than its --tls-client-ca?");
+  return Failed(
+      absl::StrCat("no handshake: ", why),
+      options.tls_certificate.empty()
+          ? "the server may require a client certificate: --tls-cert and --tls-key"
+          : "the server rejects this client certificate: has it expired, or is it from an "
+            "authority other than its --tls-client-ca?");
 }
 
 }  // namespace
@@ -242,7 +245,7 @@ DoctorLine CheckTls(const ServerEndpoint& endpoint, const ConnectionOptions& opt
   DoctorLine line = {.check = "encryption", .text = absl::StrCat(what, "; ALPN selected h2")};
   if (days < kFewDays) {
     line.finding = Finding::kWarning;
-    line.advice = "whoever runs the server should renew the certificate (--tls-cert)";
+    line.advice = "the server's operator should renew the certificate (--tls-cert)";
   }
   return line;
 }
@@ -255,13 +258,13 @@ DoctorLine CheckPlain(const ServerEndpoint& endpoint) {
   }
   if (answer.ok() && absl::StartsWith(*answer, "HTTP/1.")) {
     return Failed("the port speaks HTTP/1.1 in plain text, and gRPC needs HTTP/2",
-                  "is it the port of a gateway or a proxy? The server has another one");
+                  "is it the port of a gateway or a proxy? The server uses another port");
   }
   const DoctorLine encrypted = CheckTls(endpoint, {.tls = true});
   if (encrypted.finding != Finding::kFailed || absl::StrContains(encrypted.text, "certificate") ||
       absl::StrContains(encrypted.text, "ALPN")) {
     return Failed("the port speaks TLS, and this client does not",
-                  "give --tls-ca FILE with the authority of the server's certificate, or --tls");
+                  "pass --tls-ca FILE with the authority of the server's certificate, or --tls");
   }
   return Failed("the port speaks neither HTTP/2 nor TLS",
                 "is it a tissueform-server? Its gateway and a proxy have other ports");

@@ -15,7 +15,7 @@ namespace tissueform {
 namespace {
 
 constexpr char kCheck[] = "token";
-constexpr char kLogIn[] = "log in again (`tissueform login`), or have another one made";
+constexpr char kLogIn[] = "log in again (`tissueform login`), or get another token";
 
 std::string TextClaim(const nlohmann::json& claims, const char* name) {
   const auto found = claims.find(name);
@@ -31,10 +31,11 @@ std::string TextClaim(const nlohmann::json& claims, const char* name) {
 
 std::string AdviceFor(TokenDate date) {
   if (date == TokenDate::kWithoutEnd) {
-    return "servers take no token without one; have another one made";
+    return "servers reject tokens without an expiry; get another token";
   }
-  return absl::StrCat(date == TokenDate::kEnded ? absl::StrCat(kLogIn, "; ") : "",
-                      "if the token is new, this machine's clock is wrong: set it by NTP");
+  return absl::StrCat(
+      date == TokenDate::kEnded ? absl::StrCat(kLogIn, "; ") : "",
+      "if the token is new, this machine's clock is wrong: synchronize it with NTP");
 }
 
 }  // namespace
@@ -48,11 +49,11 @@ DoctorLine CheckToken(const ConnectionOptions& options, std::chrono::system_cloc
             .advice = kLogIn};
   }
   if (*file == nullptr) {
-    return {.check = kCheck, .finding = Finding::kSkipped, .text = "none is given (--token-file)"};
+    return {.check = kCheck, .finding = Finding::kSkipped, .text = "no token (--token-file)"};
   }
   const absl::StatusOr<nlohmann::json> shown = ShowToken((*file)->Current(), now);
   if (!shown.ok()) {
-    return {.check = kCheck, .text = "one that says nothing of itself (a follow link?)"};
+    return {.check = kCheck, .text = "opaque token (a follow link?)"};
   }
   const nlohmann::json& claims = (*shown)["claims"];
   const TokenState state = TokenStateAt(claims, now);

@@ -50,7 +50,7 @@ absl::Status CheckExport(const ExportOptions& options) {
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20; };
   if (title.size() > kMaxTitleBytes || std::any_of(title.begin(), title.end(), is_control)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("--title is to be one line of at most ", kMaxTitleBytes, " bytes"));
+        absl::StrCat("--title must be one line of at most ", kMaxTitleBytes, " bytes"));
   }
   return absl::OkStatus();
 }
@@ -63,8 +63,9 @@ absl::Status Export(const ExportOptions& options) {
     TF_ASSIGN_OR_RETURN(password, ReadPasswordFile(options.password_file));
   }
   if (!options.face.title.empty()) {
-    absl::FPrintF(stderr, "--title stands in the file: make sure that it names nobody%s\n",
-                  password.empty() ? ", for all who have the file read it" : "");
+    absl::FPrintF(stderr,
+                  "--title is stored in the file: make sure that it does not name the patient%s\n",
+                  password.empty() ? "; anyone who has the file can read it" : "");
   }
   TF_ASSIGN_OR_RETURN(OpenedPlan opened, OpenPlan(options.plan, options.reading, ""));
   TF_ASSIGN_OR_RETURN(const MovingData data, ExportFace(std::move(opened), options.face));
@@ -75,18 +76,21 @@ absl::Status Export(const ExportOptions& options) {
                static_cast<double>(html.size()) * 1e-6,
                password.empty() ? "not encrypted" : "encrypted", options.html);
   absl::PrintF(
-      "not a medical device; a face identifies: treat it like a photograph of the "
+      "not a medical device; the file shows an identifiable face: treat it like a photograph of "
+      "the "
       "patient\n");
   return absl::OkStatus();
 }
 
 constexpr char kExportFooter[] =
-    "The file is a page that opens from disk in a browser, without a network: the bone moves by "
-    "sliders within\nthe limits of the case, and the face follows by prepared answers of the model "
-    "(docs/moving-file.md). It\nholds no name, no date and no identifier, but the face: treat it "
+    "The file is a web page that opens in a browser from disk, without a network. Sliders move the "
+    "bone within the limits of the case;\nthe face follows, from prepared answers of the model "
+    "(docs/moving-file.md). The file\ncontains no name, date or identifier, but it shows the face: "
+    "treat it "
     "like a photograph of the patient. Not a\nmedical device.\n\n"
     "With --password-file it is encrypted (AES-256-GCM, PBKDF2 with SHA-256, 600,000 rounds): "
-    "without the\npassword, which nobody can restore, only the notice is read. The file's bytes "
+    "without the\npassword, which cannot be recovered, only the notice is readable. The file's "
+    "bytes "
     "are the password: a letter\nwith a mark may be one character there or two, and the page opens "
     "by either.\n\n"
     "Examples:\n"
@@ -102,17 +106,18 @@ void AddExportCommand(CLI::App& app, CommandWork* work) {
   command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
   command->add_option("--html", options->html, "the file to write, NAME.html")->required();
   command->add_option("--model", options->face.model,
-                      "gradient_field, linear_elastic or neo_hookean; left out: the plan's");
+                      "gradient_field, linear_elastic or neo_hookean (default: the plan's model)");
   command
       ->add_option("--segments", options->face.segments,
-                   "the handles that get sliders, with commas between; the others stay in the "
-                   "plan's pose; left out: all")
+                   "the handles that get sliders, separated by commas; the others stay in the "
+                   "plan's pose (default: all)")
       ->delimiter(',');
   command->add_option("--password-file", options->password_file,
                       "encrypt with the password in the first line of this file");
-  command->add_option("--title", options->face.title,
-                      "stands above the picture; left out: nothing, for it could name somebody");
-  command->add_flag("--overwrite", options->overwrite, "let --html replace an older file");
+  command->add_option(
+      "--title", options->face.title,
+      "heading above the picture (default: none, because it could name the patient)");
+  command->add_flag("--overwrite", options->overwrite, "replace an existing file");
   AddAllowOutside(command, &options->reading);
   command->footer(kExportFooter);
   command->callback([options, work] { *work = [options] { return Export(*options); }; });

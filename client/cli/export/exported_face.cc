@@ -27,10 +27,10 @@ absl::StatusOr<DeformationModel> ChosenModel(const PlanProblem& problem, const s
     TF_ASSIGN_OR_RETURN(model, ModelFromName(name));
   }
   if (HasPreparedAnswers(model, problem.deformer.gradient_field)) return model;
-  return absl::InvalidArgumentError(
-      absl::StrCat("the model ", ModelName(model),
-                   ", as the plan has it, has no prepared answers, by which a file moves; choose "
-                   "linear_elastic or neo_hookean with --model"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "the model ", ModelName(model),
+      ", with the plan's settings, has no prepared answers, which a moving file needs; choose "
+      "linear_elastic or neo_hookean with --model"));
 }
 
 absl::StatusOr<std::vector<bool>> FreeHandles(const std::vector<CaseHandle>& handles,
@@ -81,8 +81,8 @@ std::vector<AnswerPose> PosesOf(const std::vector<CaseHandle>& handles) {
 absl::Status BeyondAnswers(DeformationModel model) {
   const bool is_linear = model == DeformationModel::kLinearElastic;
   return absl::FailedPreconditionError(absl::StrCat(
-      "the plan moves bone further than the prepared answers of ", ModelName(model),
-      " reach, so that the file would never show it; choose ",
+      "the plan moves bone beyond the range of the prepared answers of ", ModelName(model),
+      ", so the file could not show it; choose ",
       ModelName(is_linear ? DeformationModel::kGradientField : DeformationModel::kLinearElastic),
       " with --model, or smaller moves in the plan"));
 }

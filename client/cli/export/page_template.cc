@@ -32,7 +32,7 @@ absl::StatusOr<std::pair<absl::string_view, absl::string_view>> SplitAt(absl::st
   const std::vector<absl::string_view> parts = absl::StrSplit(page, mark);
   if (parts.size() == 2) return std::pair(parts[0], parts[1]);
   return absl::FailedPreconditionError(
-      absl::StrCat(kTemplateFile, " is of another version than this program; build or install ",
+      absl::StrCat(kTemplateFile, " has a different version from this program; build or install ",
                    "them together"));
 }
 
@@ -44,8 +44,8 @@ absl::StatusOr<std::string> ReadPageTemplate() {
   const uintmax_t size = fs::file_size(path, error);
   if (error || size > kMaxTemplateBytes) {
     return absl::NotFoundError(absl::StrCat(
-        "the page for files that move is not at ", path.string(),
-        "; deploy/build_web.sh builds it, and the package tissueform-gateway brings it"));
+        "the page template for moving files is not at ", path.string(),
+        "; build it with deploy/build_web.sh, or install the package tissueform-gateway"));
   }
   std::string page(size, '\0');
   std::ifstream file(path, std::ios::binary);

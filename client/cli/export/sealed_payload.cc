@@ -35,7 +35,7 @@ absl::StatusOr<std::string> Gzip(absl::string_view data) {
   z_stream stream = {};
   if (deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzipWindow, kMaxMemory,
                    Z_DEFAULT_STRATEGY) != Z_OK) {
-    return absl::InternalError("zlib does not begin");
+    return absl::InternalError("zlib cannot be initialized");
   }
   // 18 bytes for what gzip has around it.
   std::string out(deflateBound(&stream, data.size()) + 18, '\0');
@@ -46,7 +46,7 @@ absl::StatusOr<std::string> Gzip(absl::string_view data) {
   const int result = deflate(&stream, Z_FINISH);
   out.resize(stream.total_out);
   deflateEnd(&stream);
-  if (result != Z_STREAM_END) return absl::InternalError("zlib does not compress the data");
+  if (result != Z_STREAM_END) return absl::InternalError("zlib cannot compress the data");
   return out;
 }
 
@@ -60,7 +60,7 @@ const unsigned char* Raw(absl::string_view bytes) {
 absl::StatusOr<Bytes> RandomBytes(size_t count) {
   Bytes bytes(count, '\0');
   if (RAND_bytes(Raw(&bytes), static_cast<int>(count)) == 1) return bytes;
-  return absl::InternalError("OpenSSL has no random numbers");
+  return absl::InternalError("OpenSSL cannot generate random numbers");
 }
 
 // A key that leaves nothing in memory.
@@ -88,7 +88,7 @@ absl::StatusOr<Bytes> EncryptGcm(absl::string_view text, const SecretKey& key, c
                     EVP_EncryptFinal_ex(context.get(), Raw(&out) + written, &rest) == 1 &&
                     EVP_CIPHER_CTX_ctrl(context.get(), EVP_CTRL_GCM_GET_TAG,
                                         static_cast<int>(kTagBytes), Raw(&out) + text.size()) == 1;
-  if (!done) return absl::InternalError("OpenSSL does not encrypt the data");
+  if (!done) return absl::InternalError("OpenSSL cannot encrypt the data");
   return out;
 }
 
@@ -97,7 +97,7 @@ absl::Status DeriveKey(const std::string& password, const Bytes& salt, SecretKey
       PKCS5_PBKDF2_HMAC(password.data(), static_cast<int>(password.size()),
                         Raw(absl::string_view(salt)), static_cast<int>(salt.size()),
                         kMovingFileKeyRounds, EVP_sha256(), kKeyBytes, key->bytes.data());
-  return done == 1 ? absl::OkStatus() : absl::InternalError("OpenSSL does not make a key");
+  return done == 1 ? absl::OkStatus() : absl::InternalError("OpenSSL cannot derive a key");
 }
 
 // Letters, not bytes; nullopt where that is no UTF-8.
@@ -121,8 +121,8 @@ absl::StatusOr<SealedPayload> SealPayload(absl::string_view data, const std::str
   if (data.size() > kMaxMovingDataBytes) {
     return absl::ResourceExhaustedError(
         absl::StrCat("surfaces and prepared answers have ", data.size(),
-                     " bytes, and a file that moves at most ", kMaxMovingDataBytes,
-                     "; show fewer triangles, or choose another model"));
+                     " bytes; the limit for a moving file is ", kMaxMovingDataBytes,
+                     "; use fewer triangles, or choose another model"));
   }
   SealedPayload sealed;
   TF_ASSIGN_OR_RETURN(sealed.payload, Gzip(data));
@@ -160,9 +160,9 @@ absl::StatusOr<std::string> ReadPasswordFile(const std::string& path) {
   if (!text.empty() && text.back() == '\r') text.pop_back();
   if (text.size() > kMaxPasswordBytes || text.find_first_of("\n\r") != std::string::npos ||
       !IsUtf8(text) || CountLetters(text) < kLeastPasswordLetters) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("--password-file ", path, ": a password is one line of UTF-8 with at least ",
-                     kLeastPasswordLetters, " letters and at most ", kMaxPasswordBytes, " bytes"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--password-file ", path, ": the password must be one line of UTF-8 with at least ",
+        kLeastPasswordLetters, " letters and at most ", kMaxPasswordBytes, " bytes"));
   }
   return text;
 }

@@ -28,7 +28,7 @@ std::string SurfaceText(const GenerationReport& report) {
       "  triangles          %10d\n"
       "  components         %10d\n"
       "  intersecting pairs %10s\n"
-      "  enclosed volume    %10.4g mm^3 (0 where it is not closed)\n"
+      "  enclosed volume    %10.4g mm^3 (0 if not closed)\n"
       "  coordinates        %s\n"
       "%s",
       report.surface, surface.num_vertices, surface.num_triangles, surface.num_components,

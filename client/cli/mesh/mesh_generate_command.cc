@@ -52,7 +52,7 @@ CLI::Validator NumbersBetweenCommas(size_t least, size_t most, const char* form)
     const size_t count = Numbers(text).size();
     return count >= least && count <= most
                ? std::string()
-               : absl::StrCat(text, " is not of the form ", form, " (numbers, no spaces)");
+               : absl::StrCat(text, " does not have the form ", form, " (numbers, no spaces)");
   };
   return {check, form, form};
 }
@@ -124,14 +124,14 @@ absl::Status Refuse(const MeshGenerateOptions& options, const TriangleMesh& surf
   std::string look;
   if (!report->defects.can_be_meshed()) {
     TF_RETURN_IF_ERROR(WriteDefects(options, surface, report));
-    look = absl::StrCat("; look at ", report->defect_file);
+    look = absl::StrCat("; see ", report->defect_file);
   }
   PrintReport(options.json, GenerationReportText(*report), GenerationReportJson(*report));
   return {why.code(), absl::StrCat("surface ", options.surface, ": ", why.message(), look)};
 }
 
 SurfaceDefects LookForDefects(const TriangleMesh& surface) {
-  const StageProgress progress("looking for defects of the surface");
+  const StageProgress progress("finding surface defects");
   return FindSurfaceDefects(surface);
 }
 
@@ -162,7 +162,7 @@ void AddQualityOptions(CLI::App* generate, MeshGenerateOptions* options) {
       ->check(CLI::PositiveNumber);
   auto* edge = generate
                    ->add_option("--edge-mm", options->edge_mm,
-                                "largest tets inside: those of a regular one with this edge")
+                                "largest tets inside: the volume of a regular tet with this edge")
                    ->check(CLI::PositiveNumber);
   generate
       ->add_option("--max-volume-mm3", filling.max_tet_volume_mm3, "largest volume of a tet inside")
@@ -170,28 +170,27 @@ void AddQualityOptions(CLI::App* generate, MeshGenerateOptions* options) {
       ->excludes(edge);
   generate
       ->add_option("--radius-edge", filling.max_radius_edge_ratio,
-                   "circumradius over shortest edge that is tried for")
+                   "target ratio of circumradius to shortest edge")
       ->capture_default_str()
       ->check(CLI::Range(1.1, 100.0));
   generate
-      ->add_option("--min-dihedral-deg", filling.min_dihedral_deg,
-                   "smallest dihedral angle that is tried for")
+      ->add_option("--min-dihedral-deg", filling.min_dihedral_deg, "target minimum dihedral angle")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 18.0));
   generate->add_flag("--split-surface", options->split_surface,
-                     "let triangles of the surface be split, for better and smaller tets at it");
+                     "allow surface triangles to be split, for better and smaller tets there");
 }
 
 void AddPartOptions(CLI::App* generate, MeshGenerateOptions* options) {
   generate
       ->add_option("--region", options->regions,
-                   "the part round this point gets this number in the array `region`, and its own "
-                   "largest volume; may be repeated")
+                   "the part around this point gets this number in the array `region`, and its own "
+                   "largest volume (repeatable)")
       ->check(NumbersBetweenCommas(4, 5, "X,Y,Z,NUMBER[,VOLUME]"))
       ->allow_extra_args(false);
   generate
       ->add_option("--hole", options->holes,
-                   "the part round this point stays empty, as cavities do; may be repeated")
+                   "the part around this point stays empty, as a cavity (repeatable)")
       ->check(NumbersBetweenCommas(3, 3, "X,Y,Z"))
       ->allow_extra_args(false);
   generate->add_option("--max-seconds", options->filling.limits.max_seconds, "for the tets")
@@ -203,11 +202,11 @@ void AddPartOptions(CLI::App* generate, MeshGenerateOptions* options) {
 }
 
 constexpr char kFooter[] =
-    "The surface must be closed and must not go through itself. Where it is not so, the report "
+    "The surface must be closed and must not intersect itself. Otherwise the report "
     "says\n"
     "why, and the array `defect` of the .vtp file marks each triangle: 1 turned, 2 open edge,\n"
-    "3 edge of three or more triangles, 4 goes through another, 5 duplicate, 6 no area. Walls of\n"
-    "cavities face into them. The vertices of the surface come first in the mesh.\n"
+    "3 edge of three or more triangles, 4 intersects another, 5 duplicate, 6 no area. Walls of\n"
+    "cavities face inward. The surface's vertices come first in the mesh.\n"
     "Examples:\n"
     "  tissueform mesh generate tongue.obj --out tongue.vtu\n"
     "  tissueform mesh generate face.stl --out face.vtu --remesh-mm 3 --edge-mm 5\n"
@@ -222,15 +221,14 @@ void AddMeshGenerateCommand(CLI::App& mesh, CommandWork* work) {
   CLI::App* generate = mesh.add_subcommand("generate", "fill a closed surface with tets");
   generate->add_option("SURFACE", options->surface, "triangles (.vtp .stl .ply .obj .off)")
       ->required();
-  generate->add_option("--out", options->out, "the mesh that is written")
-      ->required()
-      ->check(VtuEnding());
+  generate->add_option("--out", options->out, "mesh file to write")->required()->check(VtuEnding());
   AddQualityOptions(generate, options.get());
   AddPartOptions(generate, options.get());
   generate
-      ->add_option("--defects", options->defects,
-                   "where triangles with defects are marked; without it MESH.defects.vtp, when the "
-                   "surface is refused")
+      ->add_option(
+          "--defects", options->defects,
+          "file in which defective triangles are marked (default: MESH.defects.vtp, if the "
+          "surface is rejected)")
       ->check(VtpEnding());
   generate->add_flag("--json", options->json, "print the report as JSON");
   generate->footer(kFooter);

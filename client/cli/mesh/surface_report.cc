@@ -32,7 +32,7 @@ SpaceWords WordsOf(FileSpace space) {
     case FileSpace::kUnstated:
       break;
   }
-  return {"taken as LPS; the file states neither LPS nor RAS", ""};
+  return {"assumed to be LPS; the file states neither LPS nor RAS", ""};
 }
 
 std::string SurfaceReportText(const std::string& path, const TriangleMeshFile& file,
@@ -45,7 +45,7 @@ std::string SurfaceReportText(const std::string& path, const TriangleMeshFile& f
       "  components         %10d\n"
       "  Euler number       %10d\n"
       "  area               %10.4g mm^2\n"
-      "  enclosed volume    %10.4g mm^3 (0 where it is not closed)\n"
+      "  enclosed volume    %10.4g mm^3 (0 if not closed)\n"
       "  coordinates        %s\n"
       "  point arrays       %s\n"
       "  cell arrays        %s\n"

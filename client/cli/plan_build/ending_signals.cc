@@ -30,7 +30,7 @@ void Note(int number) {
 absl::StatusOr<std::unique_ptr<EndingSignals>> EndingSignals::Catch() {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0) {
-    return absl::ErrnoToStatus(errno, "cannot make a pipe");
+    return absl::ErrnoToStatus(errno, "cannot create a pipe");
   }
   return std::unique_ptr<EndingSignals>(new EndingSignals(ends));
 }

@@ -46,7 +46,7 @@ absl::Status CheckStatsFile(const PlanBuildArguments& arguments) {
       fs::weakly_canonical(fs::absolute(arguments.stats, error), error).lexically_relative(out);
   if (!inside.empty() && *inside.begin() != "..") {
     return absl::FailedPreconditionError(absl::StrCat(
-        "--stats ", arguments.stats, " lies in the folder of --out; name a file elsewhere"));
+        "--stats ", arguments.stats, " is in the folder of --out; name a file elsewhere"));
   }
   return CheckWritable(arguments.stats);
 }
@@ -100,8 +100,8 @@ absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& argume
 absl::Status CheckReady(const PlanBuildArguments& arguments, const PlanBuildAnswer& made) {
   if (made.ready || arguments.accept_defects) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      absl::StrCat("the plan in ", arguments.out, " is not ready: ", made.defects, "; look at ",
-                   arguments.out, "/report.html, and give --accept-defects to go on all the same"));
+      absl::StrCat("the plan in ", arguments.out, " is not ready: ", made.defects, "; see ",
+                   arguments.out, "/report.html, or pass --accept-defects to continue"));
 }
 
 absl::Status RunPlanBuild(PlanBuildArguments arguments) {
@@ -117,16 +117,17 @@ absl::Status RunPlanBuild(PlanBuildArguments arguments) {
 }
 
 constexpr char kFooter[] =
-    "A recipe is a JSON file that says which bone moves and where to; the smallest one:\n"
+    "A recipe is a JSON file that states which bone moves and how; a minimal one:\n"
     "  {\"format\": \"tissueform-recipe\", \"version\": 1,\n"
     "   \"segments\": [{\"name\": \"mandible\", \"osteotomy\": \"bssro\",\n"
     "                 \"pose\": {\"translation_mm\": [0, -6, 0]}}]}\n"
     "(lower jaw 6 mm forward; osteotomies: bssro, le_fort_1, genioplasty; mm, DICOM LPS). All "
     "other "
-    "keys have defaults: docs/recipe-format.md. What a CT must be: docs/ct-input.md.\n\n"
+    "keys have defaults: docs/recipe-format.md. Requirements for a CT: docs/ct-input.md.\n\n"
     "DIR gets plan.json, head.vtu, segments/NAME.stl, report.html, report.json and pictures/, all "
-    "or nothing: an error or Ctrl-C leaves no folder. A plan that misses a quality requirement "
-    "is\nkept, but it is not ready: report.json says so, and the command ends with 1 unless "
+    "or nothing: after an error or Ctrl-C there is no folder. A plan that misses a quality "
+    "requirement "
+    "is\nkept, but it is not ready: report.json states so, and the exit code is 1 unless "
     "--accept-defects is given.\n\n"
     "Examples:\n"
     "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
@@ -138,7 +139,7 @@ constexpr char kFooter[] =
 
 void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
   auto arguments = std::make_shared<PlanBuildArguments>();
-  CLI::App* build = app.add_subcommand("build", "make a plan from a CT of a head");
+  CLI::App* build = app.add_subcommand("build", "build a plan from a CT of a head");
   build
       ->add_option("--ct", arguments->ct,
                    "folder of a DICOM series or a file of it, or a volume (.nii .nii.gz .nrrd "
@@ -150,16 +151,16 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
       ->required();
   build
       ->add_option("--threads", arguments->threads,
-                   "for metal, resampling, the contact trial and distances; 0, the default: all "
-                   "processors. The plan does not depend on it")
+                   "threads (default 0: one per processor); does not affect the "
+                   "plan")
       ->check(CLI::Range(0, 1024));
   build->add_option("--stats", arguments->stats,
                     "JSON file for the seconds of every stage and the memory; not in DIR");
   build->add_flag("--no-pictures", arguments->no_pictures,
                   "report without pictures: needs no display and no Xvfb");
   build->add_flag("--accept-defects", arguments->accept_defects,
-                  "end with 0 also when the plan misses a quality requirement; the report still "
-                  "says that it is not ready");
+                  "exit code 0 even if the plan misses a quality requirement; the report still "
+                  "states that it is not ready");
   build->footer(kFooter);
   build->callback([arguments, work] { *work = [arguments] { return RunPlanBuild(*arguments); }; });
 }

@@ -54,7 +54,7 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
                     "/plan.json --out after.vtu\n");
   } else {
     absl::StrAppend(&made.text, "the plan in ", request.folder_name,
-                    " is NOT ready: look at the report\n");
+                    " is NOT ready: see the report\n");
   }
   return made;
 }

@@ -118,8 +118,7 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
   command->add_option("--stats", options->stats,
                       "also write counts, times and quality to this JSON file");
   command
-      ->add_option("--threads", options->threads,
-                   "threads to compute with; the answer does not depend on it")
+      ->add_option("--threads", options->threads, "number of threads; does not affect the result")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   AddSolverThreads(command, "", &options->solver_threads);
@@ -128,7 +127,7 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
       "Examples:\n"
       "  tissueform deform plan.json --out after.vtu\n"
       "  tissueform deform plan.json --out after.vtu --model neo_hookean --stats stats.json\n"
-      "Open after.vtu in ParaView or 3D Slicer; displacement_mm is how far each vertex moved.\n"
+      "Open after.vtu in ParaView or 3D Slicer; displacement_mm is the movement of each vertex.\n"
       "Elastic models add stress, strain energy and reaction forces (docs/plan-format.md).");
   command->callback([options, work] { *work = [options] { return RunDeform(*options); }; });
 }

@@ -27,11 +27,11 @@ std::string DescribePose(const HandlePose& pose) {
 
 void PrintUncertainty(const MaterialUncertainty& uncertainty) {
   for (const MaterialUncertainty::Tissue& tissue : uncertainty.tissues) {
-    absl::PrintF("  uncertain  %s: stiffness x 1/%.4g to x %.4g in 95 of 100 cases\n", tissue.name,
+    absl::PrintF("  uncertain  %s: stiffness x 1/%.4g to x %.4g (95 %% interval)\n", tissue.name,
                  tissue.factor_95, tissue.factor_95);
   }
   if (const auto& range = uncertainty.poisson_ratio_95) {
-    absl::PrintF("  uncertain  Poisson's ratio: %.4g to %.4g in 95 of 100 cases\n", (*range)[0],
+    absl::PrintF("  uncertain  Poisson's ratio: %.4g to %.4g (95 %% interval)\n", (*range)[0],
                  (*range)[1]);
   }
 }
@@ -81,14 +81,13 @@ CLI::App* AddPlanCommand(CLI::App& app, CommandWork* work) {
       "  tissueform plan fit head/plan.json --targets chin.json --out head/fitted.json");
 
   auto options = std::make_shared<PlanCheckOptions>();
-  CLI::App* check =
-      plan->add_subcommand("check", "check a plan with its mesh and say what it asks for");
+  CLI::App* check = plan->add_subcommand("check", "check a plan and its mesh, and summarize it");
   check->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
   AddAllowOutside(check, &options->reading);
   check->footer(
       "Example:\n"
       "  tissueform plan check plan.json\n"
-      "Exit code 0: the plan can be run. 1: it cannot; the line on stderr names the key and what "
+      "Exit code 0: the plan is valid. 1: it is not; the line on stderr names the key and what "
       "to do.");
   check->callback([options, work] { *work = [options] { return RunPlanCheck(*options); }; });
   return plan;

@@ -62,7 +62,7 @@ absl::Status CheckOut(const PlanFitOptions& options) {
   for (const std::string& input : {options.plan, options.targets}) {
     if (fs::equivalent(options.out, input, ignored)) {
       return absl::FailedPreconditionError(
-          absl::StrCat("--out ", options.out, " would replace what is read; name another file"));
+          absl::StrCat("--out ", options.out, " would overwrite an input file; name another file"));
     }
   }
   if (fs::exists(options.out, ignored) && !options.overwrite) {
@@ -74,19 +74,20 @@ absl::Status CheckOut(const PlanFitOptions& options) {
 
 absl::Status CheckModel(const Plan& plan) {
   if (!HasPreparedAnswers(plan.model, plan.gradient_field)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "model ", ModelName(plan.model),
-        plan.model == DeformationModel::kGradientField
-            ? " with these settings (only propagated rotations, cotangent guidance)"
-            : "",
-        " has no prepared answers to fit with; give --model linear_elastic, neo_hookean, or a "
-        "plan of gradient_field"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("model ", ModelName(plan.model),
+                     plan.model == DeformationModel::kGradientField
+                         ? " with these settings (only propagated rotations, cotangent guidance)"
+                         : "",
+                     " has no prepared answers, which fitting needs; use --model linear_elastic, "
+                     "neo_hookean, or a "
+                     "plan of gradient_field"));
   }
   const bool is_scaled = std::any_of(plan.handles.begin(), plan.handles.end(),
                                      [](const PlannedHandle& h) { return h.pose.scale != 1; });
   if (is_scaled && plan.model == DeformationModel::kNeoHookean) {
     return absl::InvalidArgumentError(
-        "a handle of the plan is scaled, for which neo_hookean has no prepared answers; give "
+        "a handle of the plan is scaled, and neo_hookean then has no prepared answers; use "
         "--model linear_elastic or gradient_field");
   }
   return absl::OkStatus();
@@ -117,7 +118,7 @@ absl::StatusOr<PreparedFit> Prepare(const PlanProblem& plan, const FitProblem& p
   if (!response.ok()) {
     return absl::Status(
         response.status().code(),
-        absl::StrCat("no answers can be prepared for these bounds: ", response.status().message(),
+        absl::StrCat("answers cannot be prepared for these bounds: ", response.status().message(),
                      "; narrow the bounds of the rotations"));
   }
   prepared.response = *std::move(response);
@@ -150,7 +151,7 @@ absl::Status WriteFittedPlan(const PlanFitOptions& options, const Plan& plan,
   if (!fs::path(mesh).empty() &&
       (*fs::path(mesh).begin() == ".." || fs::path(mesh).is_absolute())) {
     absl::FPrintF(stderr,
-                  "note: the mesh of %s lies outside its folder; it is run with --allow-outside\n",
+                  "note: the mesh of %s is outside its folder; run it with --allow-outside\n",
                   options.out);
   }
   return absl::OkStatus();
@@ -199,14 +200,15 @@ absl::Status RunPlanFit(const PlanFitOptions& options) {
   PrintReport(options.json, FitReportText(report), json);
   if (!fit.converged || !fit.model_converged) {
     absl::FPrintF(stderr, "warning: %s\n",
-                  fit.model_converged ? "the search has not converged; the best is told"
-                                      : "the model has not converged at the poses found");
+                  fit.model_converged ? "the search has not converged; the best result is shown"
+                                      : "the model has not converged at the fitted poses");
   }
   return options.accept_misses ? absl::OkStatus() : CheckReached(report);
 }
 
 constexpr char kFooter[] =
-    "TARGETS.json says what points of the skin are to do and what bone may do for it, in mm and "
+    "TARGETS.json states the targets for points of the skin and the free movements of bone, in mm "
+    "and "
     "degrees, in\nthe plan's axes:\n"
     "  {\"format\": \"tissueform-targets\", \"version\": 1, \"unit\": \"mm\", "
     "\"coordinate_system\": \"LPS\",\n"
@@ -215,40 +217,39 @@ constexpr char kFooter[] =
     "   \"targets\": [{\"at\": {\"place\": \"chin\"}, \"along\": \"forward\", \"by_mm\": 5}],\n"
     "   \"symmetric\": true}\n"
     "A target is at a named place, at a point on the skin (\"point_mm\") or at vertices that a "
-    "selector names;\nit is to go by_mm along a direction, by a vector (\"move_mm\") or to a "
-    "position (\"to_mm\"). What is not\nfree, or null, does not move. All keys: "
+    "selector names;\nits goal is by_mm along a direction, a vector (\"move_mm\") or a "
+    "position (\"to_mm\"). Handles that are not\nfree, and null, do not move. All keys: "
     "docs/plan-fitting.md.\n\n"
-    "Told are: what was reached (by the full model), what cannot be reached and by how much, which "
-    "bounds\nhold, and how well the targets determine every number.\n\n"
+    "The report states which targets are reached (by the full model), which are missed and by how "
+    "much, which "
+    "bounds\nare active, and how well the targets determine each number.\n\n"
     "Examples:\n"
     "  tissueform plan fit head/plan.json --targets chin.json\n"
     "  tissueform plan fit head/plan.json --targets chin.json --out head/fitted.json\n"
     "  tissueform deform head/fitted.json --out after.vtu\n"
-    "Exit codes: 0 done, 1 the work failed or a target is not reached (the plan is written all the "
-    "same), 2 wrong use.";
+    "Exit codes: 0 done, 1 the work failed or a target is not reached (the plan is still "
+    "written), 2 wrong use.";
 
 }  // namespace
 
 void AddPlanFitCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<PlanFitOptions>();
-  CLI::App* fit =
-      app.add_subcommand("fit", "find the poses of the bone that give the face that is wanted");
+  CLI::App* fit = app.add_subcommand("fit", "find the bone poses that reach soft-tissue targets");
   fit->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
-  fit->add_option("--targets", options->targets, "what is wanted and what may move, see below")
+  fit->add_option("--targets", options->targets, "the targets and the free movements, see below")
       ->required();
-  fit->add_option("--out", options->out, "plan with the poses that were found to write");
+  fit->add_option("--out", options->out, "write a plan with the fitted poses");
   fit->add_option("--report", options->report,
-                  "also write what is told, and more, to this JSON file");
+                  "also write the report, with more details, to this JSON file");
   fit->add_option("--model", options->model, "use this model instead of the plan's")
       ->check(CLI::IsMember(KnownModelNames()));
-  fit->add_option("--threads", options->threads,
-                  "threads to prepare with; the answer does not depend on it")
+  fit->add_option("--threads", options->threads, "number of threads; does not affect the result")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
-  fit->add_flag("--overwrite", options->overwrite, "let --out replace an older file");
+  fit->add_flag("--overwrite", options->overwrite, "replace an existing file");
   fit->add_flag("--accept-misses", options->accept_misses,
-                "end with 0 also when a target is not reached; the report still says so");
-  fit->add_flag("--json", options->json, "print all of it as JSON");
+                "exit code 0 even if a target is not reached; the report still states it");
+  fit->add_flag("--json", options->json, "print the report as JSON");
   AddAllowOutside(fit, &options->reading);
   fit->footer(kFooter);
   fit->callback([options, work] { *work = [options] { return RunPlanFit(*options); }; });

@@ -35,7 +35,7 @@ std::string VectorText(const Vector3d& vector) {
 
 std::string TargetsText(const FitReport& report) {
   std::string text =
-      absl::StrFormat("  %-24s %10s %10s %10s\n", "target", "wanted mm", "reached mm", "missed mm");
+      absl::StrFormat("  %-24s %10s %10s %10s\n", "target", "target mm", "reached mm", "missed mm");
   for (size_t t = 0; t < report.problem->targets.size(); ++t) {
     const FitTarget& target = report.problem->targets[t];
     const FittedTarget& fitted = report.fit->targets[t];
@@ -81,7 +81,8 @@ std::string BoneText(const FitReport& report) {
   for (size_t h = 0; h < report.fit->poses.size(); ++h) {
     if (!IsMoving(report, h)) continue;
     const Vector3d moves = MiddleMoves(report, h);
-    absl::StrAppendFormat(&text, "  %s: its middle moves %s mm (%.2f mm), it turns %.2f degrees\n",
+    absl::StrAppendFormat(&text,
+                          "  %s: its center moves %s mm (%.2f mm), it rotates by %.2f degrees\n",
                           report.problem->handle_names[h], VectorText(moves), moves.norm(),
                           report.fit->poses[h].rotation_vector.norm() * kDegreesPerRadian);
   }
@@ -105,10 +106,10 @@ std::string UndeterminedText(const FitReport& report) {
   const bool too_few =
       report.problem->num_equations() < static_cast<Eigen::Index>(report.problem->unknowns.size());
   std::string text = absl::StrFormat(
-      "%d numbers may move and the targets want %d%s: %d combinations are not told by them and "
-      "move least.\nSuch a combination is, for 1 mm of movement of bone:\n",
+      "%d free numbers, %d target equations%s: %d combinations are not determined and "
+      "move least.\nSuch a combination, for 1 mm of bone movement:\n",
       report.problem->unknowns.size(), report.problem->num_equations(),
-      too_few ? ", more freedoms than targets" : "", undecided.size());
+      too_few ? ", more free numbers than equations" : "", undecided.size());
   for (size_t k = 0; k < std::min(kMaxPrinted, undecided.size()); ++k) {
     absl::StrAppend(&text, "  ", DirectionName(report, *undecided[k]), "\n");
   }
@@ -122,7 +123,7 @@ std::string ContradictionsText(const FitReport& report) {
   std::string text;
   for (const auto& [a, b] : report.fit->contradictions) {
     absl::StrAppendFormat(&text,
-                          "\"%s\" and \"%s\" ask the same of the bone and want different things: "
+                          "\"%s\" and \"%s\" need the same bone movement but have different goals: "
                           "missed by %.2f and %.2f mm\n",
                           report.problem->targets[a].name, report.problem->targets[b].name,
                           report.fit->targets[a].missed_mm, report.fit->targets[b].missed_mm);
@@ -142,15 +143,17 @@ std::string FitReportText(const FitReport& report) {
   absl::StrAppendFormat(
       &text, "bone moves %.2f mm (rms of the moving handles, from rest), %.3f s for the fit\n",
       fit.movement_mm, report.fit_seconds);
-  absl::StrAppendFormat(&text,
-                        "reached by the full model (%d answers); prepared answers were off it by "
-                        "%.4f mm at most\n",
-                        fit.model_answers, fit.prepared_error_mm);
+  absl::StrAppendFormat(
+      &text,
+      "reached by the full model (%d answers); prepared answers differ from it by "
+      "at most %.4f mm\n",
+      fit.model_answers, fit.prepared_error_mm);
   absl::StrAppend(&text, ContradictionsText(report), UndeterminedText(report));
-  absl::StrAppend(&text,
-                  "by targets: what part of a number they decide, the rest is moved least; error "
-                  "per mm: what it\nwould differ by, were all that is wanted off by 1 mm. Neither "
-                  "is the error of the model or of surgery.\n");
+  absl::StrAppend(
+      &text,
+      "by targets: the share of a number that they determine, the rest moves least; error "
+      "per mm: the change\nof the number if all targets change by 1 mm. Neither "
+      "includes the error of the model or of surgery.\n");
   if (!report.out_path.empty()) absl::StrAppend(&text, "wrote ", report.out_path, "\n");
   absl::StrAppend(&text, kNotMedicalDeviceNotice, "\n");
   return text;
@@ -172,19 +175,19 @@ absl::Status CheckReached(const FitReport& report) {
       absl::StrCat(missed, " of ", report.fit->targets.size(), " targets cannot be reached: ");
   if (!report.fit->contradictions.empty()) {
     const auto [a, b] = report.fit->contradictions.front();
-    absl::StrAppend(&message, "missed are ", told(a), " and ", told(b),
+    absl::StrAppend(&message, "missed: ", told(a), " and ", told(b),
                     ", which contradict each other");
   } else {
-    absl::StrAppend(&message, "missed most is ", told(worst));
+    absl::StrAppend(&message, "largest miss: ", told(worst));
   }
   std::vector<std::string> held;
   for (size_t i = 0; i < report.fit->unknowns.size(); ++i) {
     if (report.fit->unknowns[i].bound == ActiveBound::kNone) continue;
     held.push_back(UnknownName(*report.problem, report.problem->unknowns[i]));
   }
-  if (!held.empty()) absl::StrAppend(&message, "; bounds hold ", absl::StrJoin(held, ", "));
+  if (!held.empty()) absl::StrAppend(&message, "; active bounds: ", absl::StrJoin(held, ", "));
   return absl::FailedPreconditionError(
-      absl::StrCat(message, "; give --accept-misses to end well all the same"));
+      absl::StrCat(message, "; with --accept-misses the exit code is 0"));
 }
 
 }  // namespace tissueform

@@ -100,7 +100,7 @@ absl::Status CheckPorts(const DemoOptions& options) {
 int WebPort(const DemoOptions& options) {
   if (options.web_port.has_value()) return *options.web_port;
   if (CheckLoopbackPort(kWebPort, kWebPortOption).ok()) return kWebPort;
-  absl::PrintF("\nport %d is taken; the planner gets a free one\n", kWebPort);
+  absl::PrintF("\nport %d is in use; the planner uses a free one\n", kWebPort);
   return 0;
 }
 
@@ -109,7 +109,7 @@ absl::Status MakeOutFolder(const DemoOptions& options) {
   std::filesystem::create_directories(options.out, error);
   if (error) {
     return absl::PermissionDeniedError(
-        absl::StrCat("cannot make the folder ", options.out, ": ", error.message()));
+        absl::StrCat("cannot create the folder ", options.out, ": ", error.message()));
   }
   return CheckWritable(options.ResultPath());
 }
@@ -140,7 +140,7 @@ absl::StatusOr<DragResult> Drag(const PlanProblem& problem, const DragOptions& o
   TF_ASSIGN_OR_RETURN(DragResult drag,
                       RunDrag(client, session, NamedPoses(problem), options, demo_interrupted));
   if (drag.frames.empty()) {
-    return absl::InternalError("the server answered no pose");
+    return absl::InternalError("the server did not answer any pose");
   }
   return drag;
 }
@@ -161,7 +161,7 @@ absl::StatusOr<TwoDrags> DragTwice(const DemoOptions& options, const PlanProblem
   skin.stream.vertices.kind = AnswerVertices::Kind::kSkin;
   if (options.encoding == "int16") skin.stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;
   if (HasPreparedAnswers(problem.deformer)) skin.stream.prepared.emplace();
-  absl::PrintF("dragging: %s, over %g s at %g poses a second ...\n", MovesInWords(problem),
+  absl::PrintF("dragging: %s, over %g s at %g poses per second ...\n", MovesInWords(problem),
                options.drag.seconds, options.drag.poses_per_second);
   TwoDrags drags;
   TF_ASSIGN_OR_RETURN(drags.solved, Drag(problem, solved, client, session));
@@ -237,7 +237,7 @@ absl::Status Serve(const DemoOptions& options, const DemoCase& demo, ServerProce
   while (!demo_interrupted) {
     // Ctrl-C reaches both, in any order.
     if (server->WaitForExit(kServeStep).has_value() && !demo_interrupted) {
-      return absl::UnavailableError("the server has ended");
+      return absl::UnavailableError("the server has stopped");
     }
   }
   return absl::OkStatus();
@@ -248,7 +248,7 @@ absl::Status DragAndPredict(const DemoOptions& options, const DemoCase& demo, Se
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<PlanSession> session,
                       MakePlanSession(client, demo.problem, &demo_interrupted));
   const v1::Session& description = session->description();
-  absl::PrintF("session ready: %d free vertices, factorised in %.1f ms, %.1f MiB\n",
+  absl::PrintF("session ready: %d free vertices, factorized in %.1f ms, %.1f MiB\n",
                description.free_vertex_count(), description.seconds().factorise() * 1e3,
                static_cast<double>(description.bytes_held()) / (1 << 20));
   TF_RETURN_IF_ERROR(CheckNotInterrupted());
@@ -298,20 +298,20 @@ void AddDemoCommand(CLI::App& app, OpenPlanner open_planner, CommandWork* work) 
   CLI::App* command = app.add_subcommand(kDemoCommand.name, kDemoCommand.description);
   command
       ->add_option("--out", options->out,
-                   "folder for result.vtu, skin.stl, frames.csv, summary.json and pictures")
+                   "output folder for result.vtu, skin.stl, frames.csv, summary.json and pictures")
       ->capture_default_str();
   command->add_option("--plan", options->plan,
-                      "another plan than the bundled head; it is dragged to its own pose");
+                      "a plan to use instead of the bundled head; it is dragged to its own pose");
   command
       ->add_option("--seconds", options->drag.seconds,
-                   "how long the drag takes; one of a third of it, every frame solved, comes "
+                   "duration of the drag; a drag of a third of that, every frame solved, comes "
                    "first")
       ->check(CLI::Range(0.1, 60.0))
       ->capture_default_str();
-  command->add_option(kPortOption, options->port, "port of the server; 0 takes a free one")
+  command->add_option(kPortOption, options->port, "port of the server; 0 uses a free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
-  command->add_option("--encoding", options->encoding, "how the frames of the skin are sent")
+  command->add_option("--encoding", options->encoding, "encoding of the frames of the skin")
       ->check(CLI::IsMember({"float32", "int16"}))
       ->capture_default_str();
   command->add_flag("--no-browser", options->no_browser,
@@ -325,9 +325,11 @@ void AddDemoCommand(CLI::App& app, OpenPlanner open_planner, CommandWork* work) 
                                 kWebPort, ", or a free one where that is taken)"))
       ->check(CLI::Range(0, 65535));
   command->footer(
-      "Starts the tissueform-server that lies beside this program on loopback and ends it again.\n"
-      "It keeps the prediction at the end of the drag, and one that neo_hookean has refined.\n"
-      "The lower jaw of the bundled head goes 8 mm forward, 2 more than its plan. Open front.png,\n"
+      "Starts the tissueform-server in this program's folder on loopback, and stops it at the "
+      "end.\n"
+      "The server stores the prediction at the end of the drag, and one refined by neo_hookean.\n"
+      "The lower jaw of the bundled head moves 8 mm forward, 2 more than in its plan. Open "
+      "front.png,\n"
       "left.png and three_quarter.png, and result.vtu or skin.stl in ParaView or 3D Slicer.");
   command->callback([options, work] { *work = [options] { return RunDemo(*options); }; });
 }

@@ -113,10 +113,10 @@ void AddToJson(const DemoPrediction& prediction, OrderedJson* json) {
 }
 
 void PrintKept(const DemoPrediction& prediction) {
-  absl::PrintF("\nkept by the server: %s (%s)\n", prediction.kept, prediction.model);
+  absl::PrintF("\nstored by the server: %s (%s)\n", prediction.kept, prediction.model);
   if (!prediction.refined.empty()) {
     absl::PrintF(
-        "refined by neo_hookean: %s, which differs by %.2f mm on average and %.2f mm at most\n",
+        "refined by neo_hookean: %s; it differs by %.2f mm on average and %.2f mm at most\n",
         prediction.refined, prediction.refinement.mean_mm, prediction.refinement.max_mm);
   } else if (!prediction.refined_answer.ok()) {
     absl::PrintF("not refined by neo_hookean: %s\n", prediction.refined_answer.message());
@@ -126,8 +126,7 @@ void PrintKept(const DemoPrediction& prediction) {
 void PrintPrediction(const DemoPrediction& prediction) {
   if (!prediction.movement.empty()) {
     absl::PrintF("\nthe skin after \"%s\" by %s, in mm\n", prediction.move, prediction.model);
-    absl::PrintF("%-16s %14s %14s %14s %14s\n", "region", "foremost point", "of it forward",
-                 "mean of region", "of it forward");
+    absl::PrintF("%-16s %14s %14s %14s %14s\n", "region", "largest", "forward", "mean", "forward");
   }
   for (const RegionMovement& region : prediction.movement) {
     absl::PrintF("%-16s %14.2f %14.2f %14.2f %14.2f\n", region.name, region.foremost.total_mm,

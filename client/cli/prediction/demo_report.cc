@@ -26,7 +26,7 @@ constexpr double kAcceptedDifferenceMm = 2;
 
 void PrintSpeedInWords(const DragSummary& summary) {
   absl::PrintF(
-      "  The picture %s the hand: of 100 positions 99 came within %.1f ms; below %.0f ms a "
+      "  The image %s the hand: 99 of 100 positions arrived within %.1f ms; below %.0f ms a "
       "movement seems immediate.\n",
       summary.latency_p99_ms < kSeemsImmediateMs ? "follows" : "lags behind",
       summary.latency_p99_ms, kSeemsImmediateMs);
@@ -44,11 +44,11 @@ void PrintMovementInWords(const DemoPrediction& prediction) {
                  absl::StrJoin(parts, ", "));
   }
   if (prediction.inverted_tets == 0) {
-    absl::PrintF("  No piece of tissue was turned inside out.\n");
+    absl::PrintF("  No tet is inverted.\n");
   } else {
     absl::PrintF(
-        "  %d of %d pieces of tissue were turned inside out: the move is at the limit of what "
-        "this model can follow.\n",
+        "  %d of %d tets are inverted: the movement is at the limit of "
+        "this model.\n",
         prediction.inverted_tets, prediction.tets);
   }
 }
@@ -58,13 +58,13 @@ void PrintDifferenceInWords(const DemoPrediction& prediction) {
   const bool is_face = prediction.differences.size() > 1;
   const DistanceSummary& skin = prediction.differences[is_face ? 1 : 0].distances;
   absl::PrintF(
-      "  Two models that work differently lie within %.1f mm of each other on 95 %% of the "
+      "  Two different models agree within %.1f mm on 95 %% of the "
       "%s.\n",
       skin.p95_mm, is_face ? "face" : "skin");
   if (!is_face) return;
   absl::PrintF(
-      "  That is %s the %.0f mm that studies of predicted faces accept; how near either is to "
-      "a patient's outcome is another question.\n",
+      "  That is %s the %.0f mm that studies of predicted faces accept; agreement with a patient's "
+      "outcome is a different question.\n",
       skin.p95_mm <= kAcceptedDifferenceMm ? "less than" : "MORE than", kAcceptedDifferenceMm);
 }
 
@@ -87,7 +87,7 @@ void PrintDrag(const DragSummary& drag) {
   absl::PrintF("  frames: %d sent, %d answered, %d coalesced into newer ones\n", drag.frames_sent,
                drag.frames_answered, drag.frames_coalesced);
   if (drag.prepared_bytes > 0 && drag.frames_prepared < drag.frames_answered) {
-    absl::PrintF("  %d of them were solved: prepared answers do not reach so far\n",
+    absl::PrintF("  %d of them were solved: outside the range of the prepared answers\n",
                  drag.frames_answered - drag.frames_prepared);
   }
   absl::PrintF("  latency, pose sent to positions received: p50 %.2f ms, p99 %.2f ms\n",
@@ -160,10 +160,9 @@ void PrintDrags(const DemoDrags& drags) {
   absl::PrintF("\nevery frame solved, all %d vertices:\n", drags.solved.vertices);
   PrintDrag(drags.solved);
   if (drags.skin.prepared_bytes > 0) {
-    absl::PrintF(
-        "prepared answers, the %d vertices of the skin (made ready in %.2f s, %.1f MiB):\n",
-        drags.skin.vertices, drags.skin.open_seconds,
-        static_cast<double>(drags.skin.prepared_bytes) / (1 << 20));
+    absl::PrintF("prepared answers, the %d vertices of the skin (prepared in %.2f s, %.1f MiB):\n",
+                 drags.skin.vertices, drags.skin.open_seconds,
+                 static_cast<double>(drags.skin.prepared_bytes) / (1 << 20));
   } else {
     absl::PrintF("the %d vertices of the skin (this model has no prepared answers):\n",
                  drags.skin.vertices);
@@ -173,7 +172,7 @@ void PrintDrags(const DemoDrags& drags) {
 }
 
 void PrintInWords(const DemoDrags& drags, const DemoPrediction& prediction) {
-  absl::PrintF("\nin words:\n");
+  absl::PrintF("\nsummary:\n");
   PrintSpeedInWords(drags.skin);
   PrintMovementInWords(prediction);
   PrintDifferenceInWords(prediction);

@@ -20,6 +20,7 @@
 #include "client/cli/prediction/prediction_export.h"
 #include "client/cli/prediction/prediction_pictures.h"
 #include "client/cli/prediction/prediction_send_command.h"
+#include "client/cli/session/model_option.h"
 #include "client/cli/session/resource_text.h"
 #include "client/cli/session/server_connection.h"
 #include "client/cli/session/session_command.h"
@@ -33,7 +34,6 @@
 #include "core/base/atomic_file.h"
 #include "core/base/atomic_folder.h"
 #include "core/base/status_macros.h"
-#include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/rendering/virtual_display.h"
 #include "proto/conversion/answer_conversion.h"
@@ -63,12 +63,6 @@ struct PredictionOptions {
   std::string FullPrediction() const { return FullName("predictions", name); }
 };
 
-absl::StatusOr<v1::DeformationModel> ModelOf(const PredictionOptions& options) {
-  if (options.model.empty()) return v1::DEFORMATION_MODEL_UNSPECIFIED;
-  TF_ASSIGN_OR_RETURN(const DeformationModel model, ModelFromName(options.model));
-  return ToProto(model);
-}
-
 // Where a session's hand was last lifted.
 absl::StatusOr<std::vector<NamedPose>> CommittedPoses(TissueformClient* client,
                                                       const std::string& session) {
@@ -79,7 +73,7 @@ absl::StatusOr<std::vector<NamedPose>> CommittedPoses(TissueformClient* client,
   }
   if (poses.empty()) {
     return absl::FailedPreconditionError(
-        absl::StrCat(session, " has no committed pose; name a plan whose poses to take"));
+        absl::StrCat(session, " has no committed pose; name a plan with poses"));
   }
   return poses;
 }
@@ -87,7 +81,7 @@ absl::StatusOr<std::vector<NamedPose>> CommittedPoses(TissueformClient* client,
 // By the plan in a session of its own, in the session that is named, or at that one's own poses.
 absl::StatusOr<v1::Prediction> MakePrediction(const PredictionOptions& options,
                                               TissueformClient* client) {
-  TF_ASSIGN_OR_RETURN(const v1::DeformationModel model, ModelOf(options));
+  TF_ASSIGN_OR_RETURN(const v1::DeformationModel model, ModelOf(options.model));
   const std::string session = FullSessionName(options.session);
   if (options.plan.empty()) {
     TF_ASSIGN_OR_RETURN(const std::vector<NamedPose> poses, CommittedPoses(client, session));
@@ -113,7 +107,7 @@ absl::Status Create(const PredictionOptions& options) {
   absl::PrintF("%s, %d vertices, largest movement %.3g mm, %d tets inverted; %s\n",
                ModelText(prediction.model()), prediction.vertex_count(),
                prediction.quality().max_displacement_mm(),
-               prediction.quality().inverted_tet_count(), "the server keeps it");
+               prediction.quality().inverted_tet_count(), "the server stores it");
   const std::string not_reached = NotReachedText(ToSolveSummary(prediction.summary()));
   if (!not_reached.empty()) absl::FPrintF(stderr, "warning: %s\n", not_reached);
   return absl::OkStatus();
@@ -156,13 +150,13 @@ absl::StatusOr<std::vector<int32_t>> ReadVertexNumbers(const std::string& path) 
     int32_t vertex = 0;
     if (!absl::SimpleAtoi(word, &vertex)) {
       return absl::InvalidArgumentError(absl::StrCat(
-          path, ": \"", word, "\" is no vertex; write numbers from 0 on, with spaces between"));
+          path, ": \"", word, "\" is not a vertex; write numbers from 0, separated by spaces"));
     }
     vertices.push_back(vertex);
   }
   if (vertices.empty()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(path, ": names no vertex; write numbers from 0 on, with spaces between"));
+        absl::StrCat(path, ": no vertices; write numbers from 0, separated by spaces"));
   }
   return vertices;
 }
@@ -178,7 +172,7 @@ absl::Status Compare(const PredictionOptions& options) {
   if (options.other.empty() == options.model.empty()) {
     return absl::InvalidArgumentError("name another prediction, or a model (--model)");
   }
-  TF_ASSIGN_OR_RETURN(const v1::DeformationModel model, ModelOf(options));
+  TF_ASSIGN_OR_RETURN(const v1::DeformationModel model, ModelOf(options.model));
   PredictionCalls::Other other = model;
   if (!options.other.empty()) other = FullName("predictions", options.other);
   TF_ASSIGN_OR_RETURN(const AnswerVertices vertices, ComparedVertices(options));
@@ -255,12 +249,8 @@ absl::Status Export(const PredictionOptions& options) {
 absl::Status Delete(const PredictionOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->predictions().Delete(options.FullPrediction()));
-  absl::PrintF("%s is deleted\n", options.FullPrediction());
+  absl::PrintF("deleted %s\n", options.FullPrediction());
   return absl::OkStatus();
-}
-
-void AddModelOption(CLI::App* command, const char* what, std::string* model) {
-  command->add_option("--model", *model, what)->check(CLI::IsMember(KnownModelNames()));
 }
 
 }  // namespace
@@ -280,45 +270,45 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
     return sub;
   };
-  CLI::App* create = add("create", "predict, and have the server keep the answer", false, Create);
-  create->add_option("PLAN", options->plan, "the plan whose poses are taken");
+  CLI::App* create = add("create", "predict and store the answer on the server", false, Create);
+  create->add_option("PLAN", options->plan, "plan with the poses");
   create->add_option("--session", options->session,
-                     "the session that answers; without a plan at its committed poses");
+                     "session to predict with; without a plan, at its committed poses");
   AddModelOption(create, "use this model instead of the session's", &options->model);
-  create->add_option("--title", options->title, "what lists call it");
-  create->add_option("--case", options->case_name, "the case that it was planned in");
+  create->add_option("--title", options->title, "title in lists");
+  create->add_option("--case", options->case_name, "the case that it belongs to");
   AddAllowOutside(create, &options->reading);
 
   CLI::App* list = add("list", "all predictions", false, List);
-  list->add_option("--session", options->session, "those of this session only");
-  list->add_option("--case", options->case_name, "those of this case only");
-  add("show", "what is known of one", true, Show)->add_flag("--json", options->json, "as JSON");
+  list->add_option("--session", options->session, "only of this session");
+  list->add_option("--case", options->case_name, "only of this case");
+  add("show", "details of one", true, Show)->add_flag("--json", options->json, "as JSON");
 
-  CLI::App* compare = add("compare", "how far another one lies from it, in mm", true, Compare);
+  CLI::App* compare = add("compare", "distance to another one, in mm", true, Compare);
   compare->add_option("OTHER", options->other, "the other prediction, of the same mesh");
-  AddModelOption(compare, "in place of OTHER: what this model answers in the session of PREDICTION",
+  AddModelOption(compare, "instead of OTHER: this model's answer in the session of PREDICTION",
                  &options->model);
-  CLI::Option* skin = compare->add_flag(
-      "--skin", options->skin, "only the vertices of the mesh's surface (the server has the mesh)");
+  CLI::Option* skin = compare->add_flag("--skin", options->skin,
+                                        "only vertices on the surface (the server needs the mesh)");
   compare
       ->add_option("--vertices", options->vertices,
-                   "only the vertices whose numbers, from 0 on, stand in this text file")
+                   "only the vertices with the numbers, from 0, in this text file")
       ->type_name("FILE")
       ->excludes(skin);
   compare->add_flag("--json", options->json, "as JSON");
 
-  CLI::App* save = add("export", "write one to a file, or as pictures", true, Export);
+  CLI::App* save = add("export", "write a prediction to a file, or as pictures", true, Export);
   save->add_option("--out", options->out,
                    "OUT.vtu: the deformed mesh; OUT.stl or OUT.ply: its surface, each with its "
                    "provenance in OUT.vtu.json and so on; OUT.json: provenance and positions");
   save->add_option("--png", options->pictures,
-                   "a folder, empty or not there yet: before and after from the front, from the "
+                   "an empty or new folder: before and after from the front, from the "
                    "left and between, of its case, or of --plan or --mesh")
       ->type_name("FOLDER");
   CLI::Option* plan = save->add_option("--plan", options->plan, "the plan it was made from");
   save->add_option("--mesh", options->mesh, "the mesh file it was made from")->excludes(plan);
   AddAllowOutside(save, &options->reading);
-  add("delete", "take one out of the server's store", true, Delete);
+  add("delete", "delete one", true, Delete);
   AddPredictionSendCommands(*command, work);
   command->footer(
       "Examples:\n"

@@ -42,9 +42,9 @@ namespace {
 using OrderedJson = nlohmann::ordered_json;
 
 absl::Status OtherMesh(const v1::Prediction& prediction, const std::string& path) {
-  return absl::FailedPreconditionError(absl::StrCat(path, " is not what ", prediction.name(),
-                                                    " was made from: that is ", prediction.mesh(),
-                                                    "; name the plan that made it"));
+  return absl::FailedPreconditionError(
+      absl::StrCat(path, " is not the mesh from which ", prediction.name(), " was made: that is ",
+                   prediction.mesh(), "; name the plan that made it"));
 }
 
 // The arrays with one number per tet: what a mesh may have been uploaded with.
@@ -106,7 +106,8 @@ absl::StatusOr<CaseFile> CaseOfMesh(const PlanProblem& problem) {
                                static_cast<size_t>(rest.size()) * sizeof(double));
   std::optional<CaseSurface> skin = SkinOfMesh(*problem.mesh, problem.constraints, {});
   if (!skin)
-    return absl::InvalidArgumentError("every vertex of the mesh is fixed: no skin to show");
+    return absl::InvalidArgumentError(
+        "every vertex of the mesh is fixed: there is no skin to show");
   contents.surfaces = SegmentsOfMesh(*problem.mesh, problem.constraints);
   contents.surfaces.push_back(*std::move(skin));
   for (const HandleRegion& handle : problem.constraints.handles()) {
@@ -128,8 +129,8 @@ absl::StatusOr<PredictionMesh> ReadPlanOf(const v1::Prediction& prediction, cons
   if (MeshNameOf(problem) != prediction.mesh()) return OtherMesh(prediction, path);
   if (problem.uncertainty && RecipeSha256(problem) != prediction.recipe_sha256()) {
     absl::FPrintF(stderr,
-                  "warning: %s has other regions, stiffness or Poisson's ratio by now than %s was "
-                  "made with; its uncertainty from the material is not told\n",
+                  "warning: %s has other regions, stiffness or Poisson's ratio than when %s was "
+                  "made; its material uncertainty is omitted\n",
                   path, prediction.name());
     problem.uncertainty.reset();
   }
@@ -244,15 +245,15 @@ absl::StatusOr<CaseFile> ShownCase(const PredictionMesh* mesh, const v1::Predict
                                    TissueformClient* client) {
   if (mesh != nullptr) return CaseOfMesh(mesh->problem);
   if (prediction.case_().empty()) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        prediction.name(), " names no case that could be drawn; name its plan (--plan)"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(prediction.name(), " has no case to draw; name its plan (--plan)"));
   }
   TF_ASSIGN_OR_RETURN(const std::string bytes, client->cases().Read(prediction.case_()));
   TF_ASSIGN_OR_RETURN(CaseFile contents, ParseCase(bytes));
   if (contents.mesh.name == prediction.mesh()) return contents;
-  return absl::FailedPreconditionError(absl::StrCat(prediction.case_(), " has another mesh than ",
-                                                    prediction.name(),
-                                                    "; name the plan that made it (--plan)"));
+  return absl::FailedPreconditionError(
+      absl::StrCat(prediction.case_(), " has a different mesh from ", prediction.name(),
+                   "; name the plan that made it (--plan)"));
 }
 
 absl::Status ExportPictures(const std::string& folder, const v1::Prediction& prediction,

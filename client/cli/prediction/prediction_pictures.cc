@@ -182,7 +182,7 @@ absl::StatusOr<BeforeAndAfter> BeforeAndAfterOfCase(
     }
   }
   if (what.rest.rows() > 0) return what;
-  return absl::InvalidArgumentError("the case shows no skin, and so there is nothing to draw");
+  return absl::InvalidArgumentError("the case does not have skin to draw");
 }
 
 absl::Status DrawBeforeAndAfter(const BeforeAndAfter& what, const std::string& folder) {

@@ -88,7 +88,7 @@ absl::Status Unsend(const SendOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string name = FullName("exports", options.name);
   TF_RETURN_IF_ERROR(client->exports().Delete(name));
-  absl::PrintF("%s is taken back; what is in the PACS stays there\n", name);
+  absl::PrintF("withdrew %s; objects already in the PACS remain there\n", name);
   return absl::OkStatus();
 }
 
@@ -103,14 +103,14 @@ void AddPredictionSendCommands(CLI::App& prediction, CommandWork* work) {
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
     return sub;
   };
-  CLI::App* send = add("send", "ask a bridge to store one in the patient's study", Send);
+  CLI::App* send = add("send", "request storage of a prediction in the patient's study", Send);
   send->add_option("PREDICTION", options->name, "its name, with \"predictions/\" or without")
       ->required();
-  send->add_flag("--wait", options->wait, "until it is stored or has failed");
-  CLI::App* sent = add("sent", "what is on its way to the PACS, or there", ListSent);
+  send->add_flag("--wait", options->wait, "wait until it is stored or fails");
+  CLI::App* sent = add("sent", "list exports to the PACS", ListSent);
   sent->add_option("--prediction", options->prediction, "of this prediction only");
   sent->add_option("--case", options->case_name, "of this case only");
-  add("unsend", "take back what was sent", Unsend)
+  add("unsend", "withdraw an export", Unsend)
       ->add_option("EXPORT", options->name, "its name, with \"exports/\" or without")
       ->required();
 }

@@ -82,12 +82,13 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
   stream.reattachment.give_up_after =
       std::chrono::milliseconds(static_cast<int64_t>(1e3 * options.give_up_seconds));
   stream.stream.on_notice = [](const v1::DeformNotice& notice) {
-    if (notice.has_draining()) absl::PrintF("the server is about to end\n");
-    if (notice.has_evicted()) absl::PrintF("the session had left the server's memory ...\n");
+    if (notice.has_draining()) absl::PrintF("the server is shutting down\n");
+    if (notice.has_evicted())
+      absl::PrintF("the session was evicted from the server's memory ...\n");
     if (notice.has_restored()) absl::PrintF("... and is back\n");
     if (notice.has_followers()) absl::PrintF("watched by %d\n", notice.followers().count());
     if (notice.has_committed() && !notice.committed().failure().empty()) {
-      absl::PrintF("pose %d was not kept: %s\n", notice.committed().sequence(),
+      absl::PrintF("pose %d was not stored: %s\n", notice.committed().sequence(),
                    notice.committed().failure());
     }
   };
@@ -99,7 +100,7 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
     const double away =
         std::chrono::duration<double>(SteadyClock::now() - totals->detached_at).count();
     totals->longest_away_seconds = std::max(totals->longest_away_seconds, away);
-    absl::PrintF("attached again after %.1f s\n", away);
+    absl::PrintF("reattached after %.1f s\n", away);
   };
   return stream;
 }
@@ -114,13 +115,12 @@ struct LocalAnswers {
 absl::StatusOr<LocalAnswers> FetchLocalAnswers(TissueformClient* client, const std::string& session,
                                                const DeformStream::Options& stream) {
   if (!stream.prepared.has_value()) {
-    return absl::InvalidArgumentError(
-        "the plan's model has no prepared answers to evaluate here; leave --local out");
+    return absl::InvalidArgumentError("the plan's model has no prepared answers; omit --local");
   }
   LocalAnswers local;
   TF_ASSIGN_OR_RETURN(const v1::Session described, client->GetSession(session));
   TF_ASSIGN_OR_RETURN(local.evaluator, client->FetchPreparedAnswers(described, stream));
-  absl::PrintF("answered here, too: %d columns, %.2f MB\n", local.evaluator->header().terms(),
+  absl::PrintF("also answered locally: %d columns, %.2f MB\n", local.evaluator->header().terms(),
                1e-6 * static_cast<double>(local.evaluator->header().total_bytes()));
   return local;
 }
@@ -163,7 +163,7 @@ void PrintTotals(const ReattachingStream& drag, const SendTimes& send_times,
     absl::PrintF("; from a pose to its frame %.1f ms (p50), %.1f ms (p99)",
                  Percentile(totals.latencies_ms, 50), Percentile(totals.latencies_ms, 99));
   }
-  absl::PrintF("; attached again %d times, away for %.1f s at most", drag.reattachments(),
+  absl::PrintF("; reattached %d times, disconnected for at most %.1f s", drag.reattachments(),
                totals.longest_away_seconds);
   if (const auto committed = drag.last_committed(); committed.has_value()) {
     absl::PrintF("; committed up to pose %d", *committed);
@@ -173,14 +173,14 @@ void PrintTotals(const ReattachingStream& drag, const SendTimes& send_times,
     absl::PrintF("%s\n", LargestBandText(totals.largest_band_mm));
   }
   if (totals.not_reached > 0) {
-    absl::FPrintF(stderr, "warning: %d answers are not what was asked for; the last: %s\n",
+    absl::FPrintF(stderr, "warning: %d answers do not meet the requirements; the last: %s\n",
                   totals.not_reached, totals.last_not_reached);
   }
 }
 
 void PrintLocal(const LocalAnswers& local) {
   if (local.evaluator == nullptr) return;
-  absl::PrintF("answered here: %d poses, %d beyond what was prepared", local.times_ms.size(),
+  absl::PrintF("answered locally: %d poses, %d beyond the prepared range", local.times_ms.size(),
                local.beyond);
   if (!local.times_ms.empty()) {
     absl::PrintF("; %.2f ms (p50), %.2f ms (p99)", Percentile(local.times_ms, 50),
@@ -199,8 +199,8 @@ absl::Status Drag(TissueformClient* client, const PlanProblem& problem,
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<ReattachingStream> drag,
                       ReattachingStream::Open(client, session, stream));
   absl::PrintF(
-      "dragging %s, %d vertices a frame; kill the server and start it again to see the "
-      "drag go on\n",
+      "dragging %s, %d vertices per frame; kill and restart the server to see the "
+      "drag continue\n",
       session, drag->started().vertex_count());
   LocalAnswers local;
   if (options.local) {
@@ -243,19 +243,19 @@ void AddDragCommand(CLI::App& app, CommandWork* work) {
   CLI::App* command = app.add_subcommand(kDragCommand.name, kDragCommand.description);
   command->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
   AddServerOption(command, &options->server);
-  command->add_option("--seconds", options->seconds, "how long")
+  command->add_option("--seconds", options->seconds, "duration")
       ->check(CLI::Range(0.1, 86400.0))
       ->capture_default_str();
-  command->add_option("--rate", options->poses_per_second, "poses a second")
+  command->add_option("--rate", options->poses_per_second, "poses per second")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
   command
       ->add_option("--reconnect-timeout", options->give_up_seconds,
-                   "how long to wait for a server that is away")
+                   "seconds to wait for an unreachable server")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   command->add_flag("--local", options->local,
-                    "fetch the prepared answers and answer every pose here, too");
+                    "fetch the prepared answers and also answer every pose locally");
   command->footer(
       "Example:\n"
       "  tissueform-server --port 50051 &\n"

@@ -33,13 +33,13 @@ int TryToListen(int fd, int port) {
 
 absl::Status CheckLoopbackPort(int port, const std::string& option) {
   const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) return absl::ErrnoToStatus(errno, "cannot make a socket");
+  if (fd < 0) return absl::ErrnoToStatus(errno, "cannot create a socket");
   const int error = TryToListen(fd, port);
   close(fd);
   if (error == 0) return absl::OkStatus();
   return absl::UnavailableError(
       absl::StrCat(option, " ", port, ": cannot listen on 127.0.0.1:", port, ": ",
-                   std::strerror(error), "; give another port, or 0 for a free one"));
+                   std::strerror(error), "; use another port, or 0 for a free one"));
 }
 
 }  // namespace tissueform

@@ -94,7 +94,7 @@ void AddRunCommand(CLI::App& app, CommandWork* work) {
       "Example, in two terminals:\n"
       "  tissueform-server --port 50051\n"
       "  tissueform run plan.json --server localhost:50051 --out after.vtu\n"
-      "The server keeps the mesh for the next run; the session is deleted at the end.");
+      "The server stores the mesh for the next run; the session is deleted at the end.");
   command->callback([options, work] { *work = [options] { return Run(*options); }; });
 }
 

@@ -27,48 +27,49 @@ std::filesystem::path ConfigurationFolder() {
 
 void AddConnectionOptions(CLI::App* command, ConnectionOptions* options) {
   constexpr char kGroup[] = "Connection";
-  command->add_flag("--tls", options->tls, "encrypted, with the authorities of this machine")
+  command->add_flag("--tls", options->tls, "use TLS with this machine's certificate authorities")
       ->group(kGroup);
   command
       ->add_option("--tls-ca", options->tls_ca,
-                   "encrypted, with these authorities of the server's certificate (PEM)")
+                   "use TLS with the certificate authorities in this file (PEM)")
       ->type_name("FILE")
       ->envname("TISSUEFORM_TLS_CA")
       ->group(kGroup);
-  CLI::Option* certificate =
-      command
-          ->add_option("--tls-cert", options->tls_certificate,
-                       "one's own certificate, where the server asks for one")
+  CLI::Option* certificate = command
+                                 ->add_option("--tls-cert", options->tls_certificate,
+                                              "client certificate, if the server requests one")
+                                 ->type_name("FILE")
+                                 ->group(kGroup);
+  CLI::Option* key =
+      command->add_option("--tls-key", options->tls_key, "key of the client certificate")
           ->type_name("FILE")
+          ->needs(certificate)
           ->group(kGroup);
-  CLI::Option* key = command->add_option("--tls-key", options->tls_key, "its key")
-                         ->type_name("FILE")
-                         ->needs(certificate)
-                         ->group(kGroup);
   certificate->needs(key);
   command
       ->add_option("--token-file", options->token_file,
-                   "the token that says who one is, mode 0600; one that is renewed is read again "
-                   "(default: $XDG_CONFIG_HOME/tissueform/token where it exists)")
+                   "token file, mode 0600; reloaded when renewed "
+                   "(default: $XDG_CONFIG_HOME/tissueform/token if it exists)")
       ->type_name("FILE")
       ->envname("TISSUEFORM_TOKEN_FILE")
       ->group(kGroup);
   command
       ->add_flag("--insecure", options->insecure,
-                 "without encryption also to another machine; a token never goes there so")
+                 "allow unencrypted connections to other machines; never sends a token unencrypted")
       ->group(kGroup);
 }
 
 void AddServerOption(CLI::App* command, ServerConnection* server) {
-  command->add_option("--server", server->address, "where the server listens")
+  command->add_option("--server", server->address, "address of the server")
       ->required()
       ->type_name("HOST:PORT");
   AddConnectionOptions(command, &server->options);
 }
 
 std::string DetachedText(const absl::Status& why) {
-  if (HasReason(why, ErrorReason::kSessionMoved)) return "moved to another server, going on";
-  return absl::StrCat("the connection is lost (", why.message(), "); trying again");
+  if (HasReason(why, ErrorReason::kSessionMoved))
+    return "session moved to another server; continuing";
+  return absl::StrCat("connection lost (", why.message(), "); trying again");
 }
 
 std::string DefaultTokenPath() {

@@ -60,7 +60,7 @@ void PrintTable(const v1::ServerInfo& info) {
   absl::PrintF(kRow, "version", info.version());
   absl::PrintF(kRow, "commit", info.commit());
   absl::PrintF(kRow, "protocol", info.api_version());
-  absl::PrintF(kRow, "state", info.draining() ? "draining: takes no new work" : "serving");
+  absl::PrintF(kRow, "state", info.draining() ? "draining: accepts no new work" : "serving");
   absl::PrintF(kRow, "encodings", absl::StrJoin(EncodingNames(info), ", "));
   absl::PrintF("\n%-28s %-10s %s\n", "model", "iterates", "prepared answers");
   for (const v1::ModelInfo& model : info.models()) {

@@ -84,7 +84,7 @@ absl::Status List(const ServerMeshOptions& options) {
 absl::Status Delete(const ServerMeshOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->DeleteMesh(FullMeshName(options.mesh)));
-  absl::PrintF("%s is deleted\n", FullMeshName(options.mesh));
+  absl::PrintF("deleted %s\n", FullMeshName(options.mesh));
   return absl::OkStatus();
 }
 
@@ -92,7 +92,7 @@ absl::Status Delete(const ServerMeshOptions& options) {
 
 void AddServerMeshCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<ServerMeshOptions>();
-  CLI::App* command = app.add_subcommand("mesh", "the meshes of a server");
+  CLI::App* command = app.add_subcommand("mesh", "list the meshes of a server");
   command->require_subcommand(1);
   const auto add = [&](const CompanionCommand& companion, const char* what,
                        absl::Status (*run)(const ServerMeshOptions&)) {
@@ -102,7 +102,7 @@ void AddServerMeshCommand(CLI::App& app, CommandWork* work) {
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
   };
   add(kMeshUploadCommand,
-      "a mesh of tets (.vtu .vtk .msh .mesh .node .ele); its arrays of one number a tet go along",
+      "a mesh of tetrahedra (.vtu .vtk .msh .mesh .node .ele), with its scalar cell arrays",
       Upload);
   add(kMeshListCommand, nullptr, List);
   add(kMeshDeleteCommand, "its name, with \"meshes/\" or without", Delete);

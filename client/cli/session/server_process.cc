@@ -60,7 +60,7 @@ absl::Status ServerProcess::WaitUntilListening(std::chrono::milliseconds deadlin
         std::chrono::duration_cast<std::chrono::milliseconds>(end - SteadyClock::now());
     pollfd readable{.fd = program_->answer(), .events = POLLIN, .revents = 0};
     const int ready = left.count() <= 0 ? 0 : poll(&readable, 1, static_cast<int>(left.count()));
-    if (ready == 0) return absl::UnavailableError(absl::StrCat(name_, " did not listen in time"));
+    if (ready == 0) return absl::UnavailableError(absl::StrCat(name_, " was not ready in time"));
     if (ready < 0) return absl::CancelledError("interrupted");
     std::array<char, 256> buffer{};
     const ssize_t count = read(program_->answer(), buffer.data(), buffer.size());
@@ -68,7 +68,7 @@ absl::Status ServerProcess::WaitUntilListening(std::chrono::milliseconds deadlin
       text.append(buffer.data(), count);
     } else if (count == 0) {
       return absl::UnavailableError(
-          absl::StrCat(name_, " ended before it listened; see its message above"));
+          absl::StrCat(name_, " ended before it was ready; see its message above"));
     } else if (errno != EINTR) {
       return absl::ErrnoToStatus(errno, absl::StrCat("cannot read from ", name_));
     } else {
@@ -77,7 +77,7 @@ absl::Status ServerProcess::WaitUntilListening(std::chrono::milliseconds deadlin
   }
   absl::string_view line = absl::string_view(text).substr(0, text.find('\n'));
   if (!absl::ConsumePrefix(&line, kListening)) {
-    return absl::InternalError(absl::StrCat(name_, " did not say where it listens"));
+    return absl::InternalError(absl::StrCat(name_, " did not print its address"));
   }
   address_ = std::string(line);
   return absl::OkStatus();

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
+#include "client/cli/session/model_option.h"
 #include "client/cli/session/resource_text.h"
 #include "client/cli/session/server_connection.h"
 #include "client/cli/session/session_wait.h"
@@ -75,7 +75,7 @@ absl::Status CheckSameVertices(TissueformClient* client, const std::string& sess
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(absl::StrFormat(
-      "the plan's mesh has %d vertices and %d tets, the mesh of %s %d and %d; name a plan of the "
+      "the plan's mesh has %d vertices and %d tets, the mesh of %s %d and %d; use a plan of the "
       "same mesh",
       problem.mesh->num_vertices(), problem.mesh->num_tets(), session, mesh.vertex_count(),
       mesh.tet_count()));
@@ -97,13 +97,7 @@ absl::Status Update(const SessionOptions& options) {
   v1::UpdateSessionRequest request;
   request.set_name(FullSessionName(options.name));
   request.set_etag(options.etag);
-  v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED;
-  if (!options.model.empty() &&
-      !v1::DeformationModel_Parse("DEFORMATION_MODEL_" + absl::AsciiStrToUpper(options.model),
-                                  &model)) {
-    return absl::InvalidArgumentError(
-        "--model must be gradient_field, arap, linear_elastic or neo_hookean");
-  }
+  TF_ASSIGN_OR_RETURN(const v1::DeformationModel model, ModelOf(options.model));
   request.set_model(model);
   if (options.stiffness_pa.has_value()) {
     request.mutable_stiffness()->set_uniform_pa(*options.stiffness_pa);
@@ -114,7 +108,7 @@ absl::Status Update(const SessionOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   if (!options.regions.empty()) TF_RETURN_IF_ERROR(SetRegions(options, client.get(), &request));
   TF_ASSIGN_OR_RETURN(const v1::Session session, UpdateAndTell(client.get(), request));
-  absl::PrintF("%s is prepared anew: %s, handles %s, %d vertices fixed, etag %s\n", session.name(),
+  absl::PrintF("prepared %s again: %s, handles %s, %d vertices fixed, etag %s\n", session.name(),
                ModelText(session.model()), absl::StrJoin(session.handles(), ", "),
                session.fixed_vertex_count(), session.etag());
   return absl::OkStatus();
@@ -123,29 +117,28 @@ absl::Status Update(const SessionOptions& options) {
 absl::Status Delete(const SessionOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   TF_RETURN_IF_ERROR(client->DeleteSession(FullSessionName(options.name)));
-  absl::PrintF("%s is deleted\n", FullSessionName(options.name));
+  absl::PrintF("deleted %s\n", FullSessionName(options.name));
   return absl::OkStatus();
 }
 
 void AddUpdateOptions(CLI::App* command, SessionOptions* options) {
-  command->add_option("--model", options->model,
-                      "gradient_field, arap, linear_elastic or neo_hookean");
+  AddModelOption(command, "use this model instead of the session's", &options->model);
   CLI::Option* uniform =
       command->add_option("--stiffness-pa", options->stiffness_pa, "the same for every tet, in Pa");
   command
       ->add_option("--stiffness-array", options->stiffness_array,
-                   "a cell array of the mesh that holds it, in Pa")
+                   "cell array of the mesh with the stiffness, in Pa")
       ->excludes(uniform);
   command->add_option("--poisson-ratio", options->poisson_ratio, "of the elastic models");
   command
       ->add_option("--regions", options->regions,
-                   "a plan of the same mesh, whose fixed vertices and handles are taken in "
-                   "place of all regions; nothing else of it is. Where its handles are named as "
-                   "before, in the same order, open drags go on")
+                   "a plan of the same mesh whose fixed vertices and handles replace "
+                   "all regions. If its handles have the same names "
+                   "in the same order, open drags continue")
       ->type_name("PLAN");
   AddAllowOutside(command, &options->reading);
   command->add_option("--etag", options->etag,
-                      "only if it is still this version (session show tells it)");
+                      "only if the session still has this etag (see session show)");
 }
 
 }  // namespace
@@ -169,13 +162,12 @@ void AddSessionCommand(CLI::App& app, CommandWork* work) {
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });
     return sub;
   };
-  add("list", "all sessions, in memory or not", false, List);
-  add("show", "what is known of one", true, Show);
-  AddUpdateOptions(
-      add("update", "prepare one anew with another model or stiffness, or other regions", true,
-          Update),
-      options.get());
-  add("delete", "end one, and what is kept of it", true, Delete);
+  add("list", "list all sessions, in memory or not", false, List);
+  add("show", "details of one", true, Show);
+  AddUpdateOptions(add("update", "prepare one again with another model, stiffness or other regions",
+                       true, Update),
+                   options.get());
+  add("delete", "delete one", true, Delete);
   command->footer("Example:\n  tissueform session list --server localhost:50051");
 }
 

@@ -26,8 +26,8 @@ UploadOptions UploadLines::Options() {
   };
   options.on_interrupted = [this](const absl::Status& why) { Interrupted(why); };
   options.on_resumed = [this](int64_t from_bytes, int64_t total_bytes) {
-    Resumed(from_bytes == 0 ? "the upload begins anew"
-                            : absl::StrCat("the upload goes on: the server has ",
+    Resumed(from_bytes == 0 ? "the upload restarts"
+                            : absl::StrCat("the upload continues: the server has ",
                                            PartOf(from_bytes, total_bytes), " already"));
   };
   return options;
@@ -39,7 +39,7 @@ void UploadLines::Interrupted(const absl::Status& why) {
   interrupted_by_ = why.code();
   interrupted_s_ = now_s;
   resumed_.clear();
-  print_(absl::StrCat("the upload is interrupted (", why.message(), "); trying again"));
+  print_(absl::StrCat("upload interrupted (", why.message(), "); trying again"));
 }
 
 void UploadLines::Resumed(const std::string& line) {

@@ -64,7 +64,7 @@ class Seen {
     if (origin_ == v1::WATCH_ORIGIN_DRAG) {
       absl::PrintF("sequence %d (frame %d)\n", sequence_, number_);
     } else {
-      absl::PrintF("nobody drags: %s\n",
+      absl::PrintF("no drag: %s\n",
                    origin_ == v1::WATCH_ORIGIN_COMMITTED ? "the committed poses" : "at rest");
     }
     frames_ = 0;
@@ -83,10 +83,10 @@ class Seen {
 
 void TellNotice(const v1::DeformNotice& notice) {
   if (notice.has_draining()) {
-    absl::PrintF("the server ends, at %s the latest\n",
+    absl::PrintF("the server shuts down at %s at the latest\n",
                  google::protobuf::util::TimeUtil::ToString(notice.draining().end_time()));
   }
-  if (notice.has_evicted()) absl::PrintF("the session has left the server's memory\n");
+  if (notice.has_evicted()) absl::PrintF("the session was evicted from the server's memory\n");
   if (notice.has_restored()) absl::PrintF("the session is back in memory\n");
 }
 
@@ -109,7 +109,7 @@ absl::Status Run(const WatchCommandOptions& options) {
   };
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<ReattachingWatch> watch,
                       ReattachingWatch::Open(client.get(), session, std::move(watching)));
-  absl::PrintF("watching %s, %d vertices a frame\n", session, watch->form().vertex_count());
+  absl::PrintF("watching %s, %d vertices per frame\n", session, watch->form().vertex_count());
   Seen seen;
   std::thread receiver([&] { Receive(watch.get(), &seen); });
   const auto start = std::chrono::steady_clock::now();
@@ -132,13 +132,13 @@ void AddWatchCommand(CLI::App& app, CommandWork* work) {
   command->add_option("SESSION", options->session, "its name, with \"sessions/\" or without")
       ->required();
   AddServerOption(command, &options->server);
-  command->add_option("--seconds", options->seconds, "how long; 0: until it ends")
+  command->add_option("--seconds", options->seconds, "seconds to watch; 0: until it ends")
       ->check(CLI::Range(0, 86400))
       ->capture_default_str();
   command->footer(
-      "A line a second: frames since the line before, how old the newest one is by both machines' "
+      "One line per second: new frames, age of the newest one by both machines' "
       "clocks, and its pose.\n"
-      "Example, beside `tissueform drag`:\n"
+      "Example, while `tissueform drag` runs:\n"
       "  tissueform session list --server localhost:50051\n"
       "  tissueform watch SESSION --server localhost:50051");
   command->callback([options, work] { *work = [options] { return Run(*options); }; });

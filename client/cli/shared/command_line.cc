@@ -14,17 +14,17 @@ namespace tissueform {
 namespace {
 
 constexpr char kDescription[] =
-    "Predicts soft tissue after jaw surgery from a plan: a tet mesh, what is fixed, what moves and "
+    "Predicts soft tissue after jaw surgery from a plan: a tet mesh, fixed vertices, handles and "
     "how.\n"
     "Research software, not a medical device: not for diagnosis or treatment.";
 
 constexpr char kFooter[] =
-    "A first run:\n"
+    "Getting started:\n"
     "  tissueform mesh check face.vtu\n"
     "  tissueform plan check plan.json\n"
     "  tissueform deform plan.json --out after.vtu\n\n"
     "Exit codes: 0 done, 1 the work failed, 2 wrong use. Errors are one line on stderr.\n"
-    "The plan file is described in docs/plan-format.md.";
+    "Plan files: docs/plan-format.md.";
 
 }  // namespace
 

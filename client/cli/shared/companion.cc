@@ -17,7 +17,7 @@ namespace {
 
 absl::Status NotInstalled(const CompanionCommand& companion) {
   return absl::NotFoundError(absl::StrCat(
-      "`", companion.name, "` is for developers and is not installed here; build the target ",
+      "`", companion.name, "` is a developer tool that is not installed here; build the target ",
       companion.program, " from source"));
 }
 

@@ -22,51 +22,50 @@ struct CompanionCommand {
 inline constexpr CompanionCommand kRunCommand = {"run", "predict through a tissueform-server",
                                                  "tissueform-online"};
 inline constexpr CompanionCommand kDemoCommand = {
-    "demo", "drag the lower jaw of the bundled real head through a server, end to end",
+    "demo", "drag the mandible of the bundled head through a server, end to end",
     "tissueform-online"};
 inline constexpr CompanionCommand kLoadCommand = {
     "load", "drag many sessions of a server at once and report the age of the frames",
     "tissueform-load", true};
 inline constexpr CompanionCommand kBenchCommand = {
-    "bench", "measure on this machine against the libraries one would use instead",
-    "tissueform-benchmarks", true};
+    "bench", "benchmark against other libraries on this machine", "tissueform-benchmarks", true};
 inline constexpr CompanionCommand kDragCommand = {
-    "drag", "drag on a server, to and fro; goes on when the server is started again",
+    "drag", "drag on a server, back and forth; continues after a restart of the server",
     "tissueform-online"};
 inline constexpr CompanionCommand kSessionCommand = {
     "session", "list, show, update, link and delete the sessions of a server", "tissueform-online"};
 // Of `mesh`.
 inline constexpr CompanionCommand kMeshUploadCommand = {
-    "upload", "give a mesh of tets to a server, which tells its name", "tissueform-online"};
-inline constexpr CompanionCommand kMeshListCommand = {"list", "the meshes that a server has",
+    "upload", "upload a mesh to a server and print its name", "tissueform-online"};
+inline constexpr CompanionCommand kMeshListCommand = {"list", "list the meshes of a server",
                                                       "tissueform-online"};
 inline constexpr CompanionCommand kMeshDeleteCommand = {
-    "delete", "delete a mesh of a server from which no session is made", "tissueform-online"};
-inline constexpr CompanionCommand kWatchCommand = {
-    "watch", "follow a session that somebody drags, a line a second", "tissueform-online"};
+    "delete", "delete a mesh without sessions from a server", "tissueform-online"};
+inline constexpr CompanionCommand kWatchCommand = {"watch", "watch a drag, one line per second",
+                                                   "tissueform-online"};
 inline constexpr CompanionCommand kPredictionCommand = {
-    "prediction", "make, list, compare, export, delete and send to the PACS what a server keeps",
+    "prediction",
+    "create, list, compare, export and delete stored predictions, or send them to the PACS",
     "tissueform-online"};
 inline constexpr CompanionCommand kCaseCommand = {"case", "cases: what the browser planner opens",
                                                   "tissueform-online"};
 inline constexpr CompanionCommand kExportCommand = {
-    "export", "make a file in which a face moves: one page that opens without a server",
+    "export", "create a moving file: one web page that works without a server",
     "tissueform-online"};
-inline constexpr CompanionCommand kShareCommand = {
-    "share", "let others look at one's own on a server, or drag it", "tissueform-online"};
-inline constexpr CompanionCommand kWhoamiCommand = {"whoami", "tell whom a server takes one for",
+inline constexpr CompanionCommand kShareCommand = {"share", "share your resources on a server",
+                                                   "tissueform-online"};
+inline constexpr CompanionCommand kWhoamiCommand = {"whoami", "show your identity on a server",
                                                     "tissueform-online"};
 inline constexpr CompanionCommand kServerInfoCommand = {
-    "server-info", "tell what a server is: version, models, limits", "tissueform-online"};
+    "server-info", "show a server's version, models and limits", "tissueform-online"};
 inline constexpr CompanionCommand kDoctorCommand = {
-    "doctor", "tell why a server cannot be used from here, from its name to a drag",
-    "tissueform-online"};
+    "doctor", "diagnose the connection to a server, from its name to a drag", "tissueform-online"};
 inline constexpr CompanionCommand kLoginCommand = {
-    "login", "log in at an identity provider: the token that servers ask for", "tissueform-online"};
-inline constexpr CompanionCommand kLogoutCommand = {
-    "logout", "remove the token that `login` has left", "tissueform-online"};
+    "login", "log in at an identity provider and store the token", "tissueform-online"};
+inline constexpr CompanionCommand kLogoutCommand = {"logout", "remove the stored token",
+                                                    "tissueform-online"};
 inline constexpr CompanionCommand kExperimentsCommand = {
-    "experiments", "compute the paper's figures and table again, and the models' accuracy",
+    "experiments", "reproduce the paper's figures and table, and measure the models' accuracy",
     "tissueform-experiments", true};
 
 // Adds the command to `app`; all that follows its name, --help too, is left to the companion, which

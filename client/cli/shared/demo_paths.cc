@@ -20,7 +20,7 @@ absl::StatusOr<std::string> FindBundledPlan(const std::string& name) {
   std::error_code error;
   if (fs::is_regular_file(plan, error)) return plan.string();
   return absl::NotFoundError(absl::StrCat("the bundled plan \"", name,
-                                          "\" is not where it is installed (", plan.string(), ")"));
+                                          "\" is not at its installed path (", plan.string(), ")"));
 }
 
 absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen) {
@@ -30,7 +30,7 @@ absl::StatusOr<std::string> FindDemoPlan(const std::string& chosen) {
   const absl::StatusOr<std::string> head = FindBundledPlan("head");
   if (head.ok()) return head;
   return absl::NotFoundError(
-      absl::StrCat(absl::string_view(head.status().message()), "; give one with --plan"));
+      absl::StrCat(absl::string_view(head.status().message()), "; pass a plan with --plan"));
 }
 
 }  // namespace tissueform

@@ -41,7 +41,7 @@ ExitCode ReportOutcome(const absl::Status& outcome, std::ostream& err) {
 
 absl::Status FlushOutput() {
   if (std::cout.flush() && std::fflush(stdout) == 0) return absl::OkStatus();
-  return absl::DataLossError("cannot write to standard output; check where it leads to");
+  return absl::DataLossError("cannot write to standard output");
 }
 
 ExitCode ReportParseError(const CLI::App& app, const CLI::ParseError& error, std::ostream& out,

@@ -22,7 +22,7 @@ CLI::Validator Ending(const std::string& ending, const std::string& form) {
 
 std::string NonFinite(const std::string& text) {
   double value = 0;
-  return absl::SimpleAtod(text, &value) && !std::isfinite(value) ? text + " is no finite number"
+  return absl::SimpleAtod(text, &value) && !std::isfinite(value) ? text + " is not a finite number"
                                                                  : "";
 }
 
@@ -33,7 +33,7 @@ CLI::Validator VtpEnding() { return Ending(".vtp", "FILE.vtp"); }
 
 void AddAllowOutside(CLI::App* command, PlanReadOptions* options) {
   command->add_flag("--allow-outside", options->allow_outside,
-                    "let the plan name a mesh outside its own folder");
+                    "allow a mesh outside the plan's folder");
 }
 
 void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) {
@@ -41,9 +41,9 @@ void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) 
   command
       ->add_option("--solver-threads", *threads,
                    when +
-                       "threads that a factorisation's dense kernels use; more than one is "
-                       "faster for large meshes on an idle machine only, and the last digits of "
-                       "the answer then depend on their number and on the machine")
+                       "threads for the dense kernels of a factorization; more than one is "
+                       "faster only for large meshes on an idle machine, and the last digits of "
+                       "the result then depend on the number of threads and on the machine")
       ->check(CLI::Range(1, kMaxOfOpenBlas))
       ->capture_default_str();
 }

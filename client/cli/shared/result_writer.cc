@@ -41,10 +41,10 @@ absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanPr
   std::error_code ignored;
   if (std::filesystem::equivalent(path, plan.mesh_path, ignored)) {
     return absl::FailedPreconditionError(
-        absl::StrCat("result ", path, " would replace the mesh of the plan; name another file"));
+        absl::StrCat("result ", path, " is the mesh of the plan; name another file"));
   }
   if (!deformed.allFinite()) {
-    return absl::InternalError("the predicted positions are not finite; nothing is written");
+    return absl::InternalError("the predicted positions are not finite; no file is written");
   }
   Positions written = deformed;
   Positions displacement = deformed - problem.mesh->positions();

@@ -56,13 +56,13 @@ std::string WhyItGaveUp(const SolveSummary& solve) {
     case Termination::kBlocked:  // the obstacle says it all
       break;
     case Termination::kIterations:
-      why = ": the iterations ran out";
+      why = ": iteration limit reached";
       break;
     case Termination::kNoRoom:
-      why = ": no memory for the second factor that it needs";
+      why = ": out of memory for the second factor";
       break;
     case Termination::kArithmetic:
-      why = ": no step makes it better";
+      why = ": no further improvement";
       break;
   }
   return solve.obstacle.empty() ? why
@@ -131,13 +131,14 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
   if (stats.band) {
     absl::PrintF("%s\n", MaterialBandText(*stats.band));
   } else if (stats.has_ranges) {
-    absl::PrintF("material uncertainty: not told; linear_elastic and neo_hookean tell theirs\n");
+    absl::PrintF("material uncertainty: only for linear_elastic and neo_hookean\n");
   }
   if (quality.inverted_tets > 0) {
-    absl::FPrintF(stderr,
-                  "warning: tets are inverted, the worst is tet %d (volume x %.3g); move less, or "
-                  "use neo_hookean\n",
-                  quality.worst_tet, quality.min_volume_ratio);
+    absl::FPrintF(
+        stderr,
+        "warning: tets are inverted, the worst is tet %d (volume x %.3g); use smaller movements or "
+        "neo_hookean\n",
+        quality.worst_tet, quality.min_volume_ratio);
   }
   if (const std::string text = NotReachedText(stats.solve); !text.empty()) {
     absl::FPrintF(stderr, "warning: %s; the file holds %s state\n", text,

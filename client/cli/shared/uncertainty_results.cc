@@ -117,12 +117,11 @@ std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
                                                    const Positions& deformed,
                                                    std::shared_ptr<MeshPreparation> preparation) {
   if (!problem.uncertainty || !IsElastic(problem)) return std::nullopt;
-  const StageProgress progress("finding the uncertainty from the material");
+  const StageProgress progress("computing the material uncertainty");
   absl::StatusOr<std::optional<MaterialBand>> band =
       FindMaterialBand(problem, deformed, std::move(preparation));
   if (band.ok()) return *std::move(band);
-  absl::FPrintF(stderr, "warning: the uncertainty from the material is not told: %s\n",
-                band.status().message());
+  absl::FPrintF(stderr, "warning: material uncertainty is omitted: %s\n", band.status().message());
   return std::nullopt;
 }
 

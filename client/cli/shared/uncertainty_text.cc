@@ -27,17 +27,17 @@ OrderedJson MaterialBandToJson(const MaterialBand& band) {
 }
 
 std::string MaterialBandText(const MaterialBand& band) {
-  if (band.places.empty()) return "material uncertainty: no vertex of the surface is free";
+  if (band.places.empty()) return "material uncertainty: the surface has no free vertices";
   const MaterialBand::Place& place = band.places.back();
   return absl::StrFormat(
-      "material uncertainty (%s): in 95 of 100 cases within %.3f mm on the %s on average, %.3f mm "
-      "where it is largest",
+      "material uncertainty (%s), 95 %% interval: +-%.3f mm on the %s on average, %.3f mm "
+      "at most",
       kMaterialUncertaintyNotice, place.mean_mm, place.name, place.max_mm);
 }
 
 std::string LargestBandText(double largest_mm) {
   return absl::StrFormat(
-      "material uncertainty (%s): in 95 of 100 cases within %.3f mm where it is largest on the "
+      "material uncertainty (%s), 95 %% interval: at most +-%.3f mm on the "
       "skin",
       kMaterialUncertaintyNotice, largest_mm);
 }

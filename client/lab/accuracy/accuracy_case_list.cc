@@ -50,7 +50,7 @@ absl::StatusOr<AccuracyCase> CreateAccuracyCase(const std::string& name,
     TF_ASSIGN_OR_RETURN(const std::string path, find_plan(bundled.plan));
     return CaseOfPlan(name, bundled.title, path);
   }
-  return absl::NotFoundError(absl::StrCat("no case \"", name, "\" to compare models on"));
+  return absl::NotFoundError(absl::StrCat("unknown case \"", name, "\""));
 }
 
 }  // namespace tissueform

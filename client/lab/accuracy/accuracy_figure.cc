@@ -147,7 +147,7 @@ absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult&
 }
 
 absl::Status DrawPoissonRatios(const std::vector<AccuracySweep>& sweeps, const std::string& path) {
-  Figure figure("Models without a Poisson's ratio against CalculiX neo-Hookean");
+  Figure figure("Models without Poisson's ratio against CalculiX neo-Hookean");
   figure.AddRow(
       kChartHeight,
       {PoissonRatioChart(sweeps, "gradient_field_propagated", "gradient field, propagated"),

@@ -34,7 +34,7 @@ std::string ReadText(const std::string& path) {
 
 // The first line that says what went wrong, otherwise the last one that says anything.
 std::string LastWord(const std::string& log) {
-  std::string last = "it printed nothing";
+  std::string last = "its output is empty";
   for (absl::string_view line : absl::StrSplit(log, '\n')) {
     line = absl::StripAsciiWhitespace(line);
     if (absl::StrContains(line, "*ERROR")) return std::string(line);
@@ -55,7 +55,7 @@ absl::Status RunProgram(const std::string& folder) {
   const auto ccx = GuardedProgram::Start(std::move(options), kEndGrace);
   if (absl::IsNotFound(ccx.status())) {
     return absl::NotFoundError(
-        "no program ccx (CalculiX, the independent finite elements); install the package "
+        "the program ccx (CalculiX, the finite-element reference) is missing; install the package "
         "calculix-ccx");
   }
   TF_RETURN_IF_ERROR(ccx.status());

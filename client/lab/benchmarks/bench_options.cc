@@ -16,30 +16,32 @@ BenchOptions::BenchOptions()
 void AddBenchOptions(CLI::App& app, BenchOptions* options) {
   app.add_option(
          "--mesh", options->meshes,
-         "which problems: bars 1 to 5 are those of the paper's Table 1, 6 has 1.5 million tets "
-         "and takes minutes, 7 (a layered block) and 8 (the tongue) set neo_hookean beside "
-         "CalculiX as whole programs; all unless given")
+         "problems (default: all): bars 1 to 5 are those of the paper's Table 1, 6 has 1.5 million "
+         "tets "
+         "and takes minutes, 7 (a layered block) and 8 (the tongue) compare neo_hookean with "
+         "CalculiX as whole programs")
       ->check(CLI::Range(1, 8));
   app.add_option("--repetitions", options->repetitions,
-                 "how often everything is done; the median counts")
+                 "number of repetitions; the table shows medians")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--threads", options->threads,
-                 "threads of assembly, rotations and right-hand sides; the BLAS has one")
+                 "threads for assembly, rotations and right-hand sides; BLAS uses one")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   app.add_option(
          "--isa", options->instruction_sets,
-         "instruction sets to time frames on (repeatable), the widest one for all other rows; all "
-         "that this processor has unless given")
+         "instruction sets to time frames with (repeatable; default: all that this processor "
+         "has); other rows use the widest")
       ->check(CLI::IsMember(InstructionSetNames(SupportedInstructionSets())));
   app.add_option("--json", options->json, "also write the table to this JSON file");
   app.footer(
-      "Columns: ours, a peer on the same work in the same run, ratio (peer / ours: above 1 we are\n"
-      "faster), memory held by ours. Peers are CHOLMOD called directly, Eigen's SimplicialLDLT, "
+      "Columns: our time, a peer's time for the same work in the same run, ratio (peer / ours: "
+      "above 1\n"
+      "we are faster), our memory. Peers are CHOLMOD called directly, Eigen's SimplicialLDLT, "
       "and\n"
       "ours with more BLAS threads. The table ends with how times grow with the mesh and with the\n"
-      "figures that were required. Nothing else should run on the machine meanwhile.\n"
+      "required figures. Run no other programs at the same time.\n"
       "Examples:\n"
       "  tissueform bench --mesh 1 --repetitions 1\n"
       "  tissueform bench --mesh 5 --mesh 6 --json bench.json\n"

@@ -28,7 +28,7 @@ constexpr int kIterationsPerRepetition = 5;
 absl::StatusOr<std::string> MakeTemporaryFolder() {
   std::string folder = (std::filesystem::temp_directory_path() / "tissueform-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) {
-    return absl::ErrnoToStatus(errno, "cannot make a temporary folder for a mesh file");
+    return absl::ErrnoToStatus(errno, "cannot create a temporary folder for a mesh file");
   }
   return folder;
 }

@@ -91,16 +91,16 @@ std::optional<double> MostSolves(const std::vector<BenchmarkRow>& rows) {
 
 void AddTimes(int bar, TargetList* list) {
   const std::string on = absl::StrCat(" on ", NameOf(bar));
-  list->AtMost(absl::StrCat("analyse + factorise / direct CHOLMOD <= 1.15", on),
-               Inverse(list->Ratio("analyse + factorise", bar, "CHOLMOD")), 1.15);
+  list->AtMost(absl::StrCat("analyze + factorize / direct CHOLMOD <= 1.15", on),
+               Inverse(list->Ratio("analyze + factorize", bar, "CHOLMOD")), 1.15);
   list->AtMost(absl::StrCat("solve 3 / direct CHOLMOD <= 1.15", on),
                Inverse(list->Ratio("solve 3", bar, "CHOLMOD")), 1.15);
-  list->AtMost(absl::StrCat("assemble / factorise <= 0.25", on),
-               Quotient(list->Ours("assemble", bar), list->Ours("factorise", bar)), 0.25);
+  list->AtMost(absl::StrCat("assemble / factorize <= 0.25", on),
+               Quotient(list->Ours("assemble", bar), list->Ours("factorize", bar)), 0.25);
   list->AtMost(absl::StrCat("local step / solve 3 <= 0.5", on),
                Quotient(list->Ours("local step", bar), list->Ours("solve 3", bar)), 0.5);
-  list->AtLeast(absl::StrCat("SimplicialLDLT / ours, analyse + factorise >= 8", on),
-                list->Ratio("analyse + factorise", bar, "Eigen SimplicialLDLT"), 8);
+  list->AtLeast(absl::StrCat("SimplicialLDLT / ours, analyze + factorize >= 8", on),
+                list->Ratio("analyze + factorize", bar, "Eigen SimplicialLDLT"), 8);
   list->AtLeast(absl::StrCat("SimplicialLDLT / ours, solve 3 >= 2", on),
                 list->Ratio("solve 3", bar, "Eigen SimplicialLDLT"), 2);
 }
@@ -120,9 +120,9 @@ void AddFrames(TargetList* list) {
                   list->FrameRatio(work, InstructionSet::kAvx2), times);
   }
   for (const auto& [handles, times] : {std::pair("", 3.0), std::pair(", 3 handles", 4.0)}) {
-    list->AtMost(absl::StrCat("basis preparation", handles, " / factorise <= ", times, on),
+    list->AtMost(absl::StrCat("basis preparation", handles, " / factorize <= ", times, on),
                  Quotient(list->Ours(absl::StrCat("basis preparation", handles), kPaperBar),
-                          list->Ours("factorise", kPaperBar)),
+                          list->Ours("factorize", kPaperBar)),
                  times);
   }
   for (const char* handles : {"", ", 3 handles"}) {

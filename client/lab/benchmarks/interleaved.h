@@ -12,7 +12,7 @@
 
 namespace tissueform::benchmarks {
 
-// Seconds of one run of a piece of work, by part: "factorise", "solve", ...
+// Seconds of one run of a piece of work, by part: "factorize", "solve", ...
 using PartSeconds = std::map<std::string, double>;
 
 struct TimedWork {

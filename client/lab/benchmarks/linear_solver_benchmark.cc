@@ -66,8 +66,8 @@ absl::Status CheckAnswer(const std::string& solver, const Eigen::MatrixXd& answe
 PartSeconds Prepare(const std::function<void()>& analyse, const std::function<void()>& factorise) {
   const double analyse_seconds = SecondsOf(analyse);
   const double factorise_seconds = SecondsOf(factorise);
-  return {{"analyse", analyse_seconds},
-          {"factorise", factorise_seconds},
+  return {{"analyze", analyse_seconds},
+          {"factorize", factorise_seconds},
           {"prepare", analyse_seconds + factorise_seconds}};
 }
 
@@ -107,8 +107,8 @@ absl::StatusOr<PartSeconds> LinearSolverBenchmark::PrepareOurs() {
   ours_.reset();
   const Stopwatch stopwatch;
   TF_ASSIGN_OR_RETURN(ours_, DirichletSystem::Create(problem_.K, bar_.ends.constrained(), {}));
-  return PartSeconds{{"analyse", ours_->factorization().analyse_seconds},
-                     {"factorise", ours_->factorization().factorise_seconds},
+  return PartSeconds{{"analyze", ours_->factorization().analyse_seconds},
+                     {"factorize", ours_->factorization().factorise_seconds},
                      {"prepare", stopwatch.Seconds()}};
 }
 
@@ -181,9 +181,9 @@ void LinearSolverBenchmark::AddContender(const std::string& name,
 }
 
 std::vector<BenchmarkRow> LinearSolverBenchmark::Rows(const PartSeconds& medians) const {
-  const std::pair<const char*, const char*> kWorkAndPart[] = {{"analyse", "analyse"},
-                                                              {"factorise", "factorise"},
-                                                              {"analyse + factorise", "prepare"},
+  const std::pair<const char*, const char*> kWorkAndPart[] = {{"analyze", "analyze"},
+                                                              {"factorize", "factorize"},
+                                                              {"analyze + factorize", "prepare"},
                                                               {"solve 3", "solve"}};
   std::vector<BenchmarkRow> rows;
   for (const auto& [work, part] : kWorkAndPart) {

@@ -130,7 +130,7 @@ absl::StatusOr<double> TimeOurs(const fs::path& home, int folders, int slices) {
   receiver->Stop();
   fs::remove_all(received);
   if (rate.ok() && kept != int64_t{folders} * slices) {
-    return absl::InternalError(absl::StrCat(kept, " slices were kept"));
+    return absl::InternalError(absl::StrCat(kept, " slices were received"));
   }
   return rate;
 }
@@ -251,7 +251,9 @@ int Run(const Options& options) {
 }  // namespace tissueform::benchmarks
 
 int main(int argc, char** argv) {
-  CLI::App app("How many slices a second the PACS bridge receives, against DCMTK's storescp");
+  CLI::App app(
+      "Measures how many slices per second the PACS bridge receives, compared with DCMTK's "
+      "storescp");
   tissueform::benchmarks::Options options;
   app.add_option("--slices", options.slices, "of each association")
       ->check(CLI::Range(1, 10'000))
@@ -259,7 +261,7 @@ int main(int argc, char** argv) {
   app.add_option("--associations", options.associations, "at once")
       ->check(CLI::Range(1, 32))
       ->capture_default_str();
-  app.add_option("--repetitions", options.repetitions, "of each receiver, in turns")
+  app.add_option("--repetitions", options.repetitions, "repetitions of each receiver, alternating")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   app.add_option("--json", options.json, "the figures as a file");

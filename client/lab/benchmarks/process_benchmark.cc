@@ -79,7 +79,7 @@ absl::Status CheckAgreement(const std::string& result, const TetMesh& rest,
   const double moved = (reference - rest.positions()).rowwise().norm().maxCoeff();
   const double off = (ours.mesh.positions() - reference).rowwise().norm().maxCoeff();
   if (off <= kAgreement * moved) return absl::OkStatus();
-  return absl::InternalError(absl::StrCat("our answer lies ", off, " mm from CalculiX's"));
+  return absl::InternalError(absl::StrCat("our answer differs by ", off, " mm from CalculiX's"));
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ absl::StatusOr<BenchmarkRow> MeasureAgainstCalculix(int number, int repetitions,
   TF_ASSIGN_OR_RETURN(const std::string plan, FindBundledPlan(ProcessProblemName(number)));
   TF_ASSIGN_OR_RETURN(const CalculixProblem problem, ProblemOf(plan));
   const TemporaryFolder folder;
-  if (!folder.made()) return absl::ErrnoToStatus(errno, "cannot make a temporary folder");
+  if (!folder.made()) return absl::ErrnoToStatus(errno, "cannot create a temporary folder");
   const std::string result = folder.path() + "/ours.vtu";
   std::vector<double> ours;
   std::vector<double> peers;

@@ -107,7 +107,7 @@ absl::Status Draw(const std::vector<NamedPull>& pulls, const TriangleIndices& tr
     panel.view = view;
     return panel;
   };
-  Figure figure("Fig. 2: block of three layers of tets, sides fixed, centre of the top moved");
+  Figure figure("Fig. 2: block of three layers of tets, sides fixed, center of the top moved");
   for (size_t row = 0; row < pulls.size(); row += 2) {
     std::vector<Scene> scenes;
     for (size_t p = row; p < row + 2; ++p) {

@@ -24,11 +24,11 @@ const std::vector<Experiment>& AllExperiments() {
       {"fig4", "steps and convergence of the linear and the cosine blend", RunBlendExperiment},
       {"fig5", "two materials under a twist of 360 degrees", RunMaterialsExperiment},
       {"fig6", "cotangent against uniform guidance on a graded bar", RunGuidanceExperiment},
-      {"table1", "times of the factorisation and of three solves", RunSolverTimesExperiment},
+      {"table1", "times of the factorization and of three solves", RunSolverTimesExperiment},
       {"accuracy", "all models against CalculiX, and locking (minutes; only when named; needs ccx)",
        RunAccuracyExperiment, true},
       {"uncertainty",
-       "the band from stiffness on two heads against sampling in full (minutes; only when named)",
+       "the band from stiffness on two heads against full sampling (minutes; only when named)",
        RunUncertaintyExperiment, true},
   };
   return *kExperiments;

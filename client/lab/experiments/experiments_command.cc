@@ -63,7 +63,7 @@ absl::Status MakeOutFolder(const std::string& folder) {
   std::filesystem::create_directories(folder, error);
   if (error) {
     return absl::FailedPreconditionError(
-        absl::StrCat("cannot make the folder ", folder, ": ", error.message()));
+        absl::StrCat("cannot create the folder ", folder, ": ", error.message()));
   }
   // Asked before minutes of work, by a file that goes again.
   const std::string probe = folder + "/.tissueform-experiments";
@@ -102,23 +102,23 @@ absl::Status RunExperiments(const ExperimentsOptions& options) {
 void AddExperimentsCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<ExperimentsOptions>();
   CLI::App* command = app.add_subcommand(kExperimentsCommand.name, kExperimentsCommand.description);
-  command->add_option("--out", options->out, "folder for pictures (.png) and numbers (.csv); made")
+  command->add_option("--out", options->out, "output folder for pictures (.png) and numbers (.csv)")
       ->required();
   command
       ->add_option("NAME,--only", options->only,
-                   "only these experiments; without a name all figures and the table of the paper")
+                   "only these experiments (default: all figures and the table of the paper)")
       ->check(CLI::IsMember(ExperimentNames()));
   command
       ->add_option("--case", options->cases,
-                   "only these cases of the experiment accuracy; without it all")
+                   "only these cases of the experiment accuracy (default: all)")
       ->check(CLI::IsMember(CaseNames()));
   command->footer(absl::StrCat(ExperimentList(),
                                "Example:\n"
                                "  tissueform experiments --out figures --only fig1\n"
                                "  tissueform experiments accuracy --out accuracy\n"
                                "  tissueform experiments accuracy --case head_chin --out accuracy\n"
-                               "docs/experiments.md shows them beside what the paper says, "
-                               "docs/accuracy.md the models beside finite elements."));
+                               "docs/experiments.md compares them with the paper, "
+                               "docs/accuracy.md the models with finite elements."));
   command->callback([options, work] { *work = [options] { return RunExperiments(*options); }; });
 }
 

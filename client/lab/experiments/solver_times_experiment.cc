@@ -77,8 +77,8 @@ absl::StatusOr<SolverTimes> TimeBar(const std::array<int, 3>& cells, int repetit
 }
 
 absl::Status RunSolverTimesExperiment(const ExperimentOptions& options) {
-  CsvTable table({"object", "vertices", "tetrahedra", "source: factorise [s]", "analyse [s]",
-                  "factorise [s]", "source: three solves [s]", "three solves [s]"});
+  CsvTable table({"object", "vertices", "tetrahedra", "source: factorize [s]", "analyze [s]",
+                  "factorize [s]", "source: three solves [s]", "three solves [s]"});
   for (const SourceRow& row : kSource) {
     TF_ASSIGN_OR_RETURN(const SolverTimes times,
                         TimeBar(row.cells, kFactorizations, options.threads));

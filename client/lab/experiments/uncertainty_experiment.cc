@@ -203,7 +203,7 @@ absl::Status RunUncertaintyExperiment(const ExperimentOptions& options) {
     TF_ASSIGN_OR_RETURN(const AccuracyCase problem, CreateAccuracyCase(name, options.find_plan));
     const SkinPlace* face = FindPlace(problem.places, "face");
     if (face == nullptr) {
-      return absl::NotFoundError(absl::StrCat("the mesh of ", name, " names no face"));
+      return absl::NotFoundError(absl::StrCat("the mesh of ", name, " does not name a face"));
     }
     for (const Model& model : models) {
       for (const double factor : model.factors) {

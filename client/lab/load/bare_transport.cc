@@ -74,7 +74,7 @@ absl::StatusOr<std::vector<double>> MeasureBareTransport(int64_t frame_bytes,
   builder.RegisterService(&service);
   const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
   if (server == nullptr || port == 0) {
-    return absl::UnavailableError("no port of 127.0.0.1 is free for the bare server");
+    return absl::UnavailableError("127.0.0.1 has no free port for the bare server");
   }
   const auto stub = v1::DeformService::NewStub(
       grpc::CreateChannel(absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials()));
@@ -91,7 +91,7 @@ absl::StatusOr<std::vector<double>> MeasureBareTransport(int64_t frame_bytes,
     request.mutable_pose()->set_sequence(static_cast<uint64_t>(i));
     const SteadyClock::time_point sent = SteadyClock::now();
     if (!stream->Write(request) || !stream->Read(&response)) {
-      return absl::UnavailableError("the bare server's stream broke off");
+      return absl::UnavailableError("the bare server's stream ended early");
     }
     latencies_ms.push_back(
         std::chrono::duration<double, std::milli>(SteadyClock::now() - sent).count());

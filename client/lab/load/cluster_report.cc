@@ -48,11 +48,11 @@ int64_t CommitsAcknowledged(const ClusterLoadResult& result) {
 std::string ClusterLoadText(const ClusterLoadOptions& options, const ClusterLoadResult& result) {
   std::string text =
       absl::StrFormat("%-20s %5s  %8s  %6s  %31s  %9s  %7s  %8s\n", "node", "drags", "frames/s",
-                      "MiB/s", "latency ms 50/90/99/most", "coalesced", "commits", "watched");
+                      "MiB/s", "latency ms 50/90/99/max", "coalesced", "commits", "watched");
   for (const auto& [name, node] : result.nodes) {
     absl::StrAppend(&text, NodeText(name, node, options.seconds));
   }
-  absl::StrAppendFormat(&text, "picture age ms 50/90/99/most: %s\n",
+  absl::StrAppendFormat(&text, "frame age ms 50/90/99/max: %s\n",
                         PercentilesText(result.picture_ages_ms, 1));
   absl::StrAppendFormat(
       &text, "poses: %d sent, %d answered, %d replaced by newer ones, %d dropped; %d sent late\n",

@@ -50,16 +50,15 @@ DeformationModel ModelOf(const std::string& name) {
 absl::Status CheckOptions(const LoadCommandOptions& options) {
   const LoadOptions& load = options.load;
   if (options.cluster && load.sessions == 0) {
-    return absl::InvalidArgumentError(
-        "--cluster drags and follows sessions; give --sessions a number");
+    return absl::InvalidArgumentError("--cluster needs drags; set --sessions");
   }
   if (load.sessions + load.slow_readers + load.refining + load.churn == 0) {
     return absl::InvalidArgumentError(
-        "nothing is asked for; give --sessions, --slow-readers, --refining or --churn a number");
+        "there is no work; set --sessions, --slow-readers, --refining or --churn");
   }
   if (load.bare && load.sessions + load.slow_readers + load.refining == 0) {
     return absl::InvalidArgumentError(
-        "--bare sends frames of the size that a drag's have, and there is no drag; give "
+        "--bare sends frames of the size of a drag's; set "
         "--sessions");
   }
   if (!options.json.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.json));
@@ -131,7 +130,7 @@ void AddClusterOptions(CLI::App* command, LoadCommandOptions* options) {
   CLI::Option* cluster =
       command
           ->add_flag("--cluster", options->cluster,
-                     "what came from each server behind one name; drags reattach and commit")
+                     "report each server behind one name; drags reattach and commit")
           ->excludes("--churn")
           ->excludes("--slow-readers")
           ->excludes("--refining")
@@ -153,47 +152,45 @@ void AddClusterOptions(CLI::App* command, LoadCommandOptions* options) {
 
 void AddOptions(CLI::App* command, LoadCommandOptions* options) {
   LoadOptions& load = options->load;
-  command
-      ->add_option("--server", options->server.address, "a server that runs; else one is started")
+  command->add_option("--server", options->server.address, "a running server (default: start one)")
       ->type_name("HOST:PORT");
   AddConnectionOptions(command, &options->server.options);
-  command->add_option("--plan", options->plan, "another plan than the bundled head");
-  command->add_option("--model", options->model, "what answers the drags")
+  command->add_option("--plan", options->plan, "a plan to use instead of the bundled head");
+  command->add_option("--model", options->model, "model of the drags")
       ->check(CLI::IsMember({"gradient_field", "linear_elastic", "neo_hookean"}))
       ->capture_default_str();
   command->add_option("--sessions", load.sessions, "drags from prepared answers")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
-  command->add_option("--rate", load.poses_per_second, "poses a second of each")
+  command->add_option("--rate", load.poses_per_second, "poses per second and drag")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
-  command->add_option("--seconds", load.seconds, "how long")
+  command->add_option("--seconds", load.seconds, "duration")
       ->check(CLI::Range(0.1, 86400.0))
       ->capture_default_str();
   command
-      ->add_option("--churn", load.churn,
-                   "clients that make and delete sessions all the while, none like another")
+      ->add_option("--churn", load.churn, "clients that create and delete sessions, all different")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
   command
       ->add_option("--slow-readers", load.slow_readers,
-                   "further drags whose client takes --slow-ms for each frame")
+                   "additional drags whose client needs --slow-ms per frame")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
-  command->add_option("--slow-ms", load.slow_ms, "what a slow reader takes")
+  command->add_option("--slow-ms", load.slow_ms, "time a slow reader needs per frame")
       ->check(CLI::Range(0.0, 10000.0))
       ->capture_default_str();
-  command->add_option("--refining", load.refining, "further drags answered by neo_hookean")
+  command->add_option("--refining", load.refining, "additional drags with neo_hookean")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
-  command->add_option("--encoding", options->encoding, "how frames are sent")
+  command->add_option("--encoding", options->encoding, "encoding of frames")
       ->check(CLI::IsMember({"float32", "int16"}))
       ->capture_default_str();
   command->add_flag("--in-phase", load.in_phase,
-                    "all drags send at the same moments; else they are spread out");
+                    "all drags send at the same time (default: spread out)");
   command->add_flag("--bare", load.bare,
-                    "afterwards also time frames of the same size that nobody computes, through\n"
-                    "gRPC alone: what a drag's latency cannot come below");
+                    "afterwards also time frames of the same size without computation, through\n"
+                    "gRPC alone: a lower bound of a drag's latency");
   command->add_option("--json", options->json, "also write the figures to this JSON file");
   AddClusterOptions(command, options);
 }
@@ -205,18 +202,19 @@ void AddLoadCommand(CLI::App& app, CommandWork* work) {
   CLI::App* command = app.add_subcommand(kLoadCommand.name, kLoadCommand.description);
   AddOptions(command, options.get());
   command->footer(
-      "Every drag has a session and a connection of its own and asks for the skin. The picture's\n"
+      "Each drag has its own session and connection and requests the skin. The frame's\n"
       "age is sampled every 10 ms: now minus the time when the newest shown pose was sent, so "
       "that\n"
-      "poses that were dropped count; the interval of the poses is part of it. The clients run\n"
-      "on this machine, too, and take their share of it. Exit code 1 when a call fails.\n"
-      "With --cluster every session has a random id, by whose hash a proxy spreads them, and the\n"
-      "figures are those of each server by the name that it says.\n"
+      "dropped poses count; the interval between poses is part of it. The clients also run\n"
+      "on this machine and use processor time. Exit code 1 if a call fails.\n"
+      "With --cluster each session has a random id, by whose hash a proxy distributes them, and "
+      "the\n"
+      "figures are per server, by its name.\n"
       "Examples:\n"
       "  tissueform load --sessions 32 --rate 30 --churn 2 --seconds 60 --json load.json\n"
       "  tissueform load --server localhost:50051 --sessions 1 --churn 0 --seconds 10\n"
       "  tissueform load --cluster --server localhost:50052 --sessions 24 --followers 24\n"
-      "docs/performance.md and docs/scaling.md tell what was measured so.");
+      "Results: docs/performance.md and docs/scaling.md.");
   command->callback([options, work] {
     options->load.int16 = options->encoding == "int16";
     *work = [options] { return Run(*options); };

@@ -74,13 +74,12 @@ std::string ErrorsText(const std::vector<absl::Status>& errors) {
 }
 
 std::string LoadText(const LoadOptions& options, const LoadResult& result) {
-  std::string text =
-      absl::StrFormat("%-12s %5s  %31s  %31s  %12s  %7s  %6s  %6s\n", "drags", "count",
-                      "picture age ms 50/90/99/most", "latency ms 50/90/99/most", "solve 50/99",
-                      "answers", "frames/s", "MiB/s");
+  std::string text = absl::StrFormat(
+      "%-12s %5s  %31s  %31s  %12s  %7s  %6s  %6s\n", "drags", "count", "frame age ms 50/90/99/max",
+      "latency ms 50/90/99/max", "solve 50/99", "answers", "frames/s", "MiB/s");
   for (const DragLoad& load : result.drags) absl::StrAppend(&text, DragText(load, options.seconds));
   if (options.churn > 0) {
-    absl::StrAppendFormat(&text, "churn: %d sessions made, s 50/90/99/most: %s\n",
+    absl::StrAppendFormat(&text, "churn: %d sessions created, s 50/90/99/max: %s\n",
                           result.session_seconds.size(),
                           PercentilesText(result.session_seconds, 2));
   }
@@ -88,7 +87,7 @@ std::string LoadText(const LoadOptions& options, const LoadResult& result) {
     const double ratio = Percentile(result.drags.front().latencies_ms, 50) /
                          Percentile(result.bare_latencies_ms, 50);
     absl::StrAppendFormat(
-        &text, "gRPC alone, one stream: latency ms 50/90/99/most %s; %s take %.2f times that\n",
+        &text, "gRPC alone, one stream: latency ms 50/90/99/max %s; %s take %.2f times that\n",
         PercentilesText(result.bare_latencies_ms, 2), result.drags.front().kind, ratio);
   }
   return absl::StrCat(text, ErrorsText(result.errors));

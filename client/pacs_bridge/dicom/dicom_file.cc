@@ -46,11 +46,11 @@ absl::Status CheckBytes(const std::string& path, const DicomLimits& limits) {
   if (!std::filesystem::exists(status)) {
     return absl::NotFoundError(absl::StrCat(path, ": there is no such file"));
   }
-  if (!std::filesystem::is_regular_file(status)) return Refused(path, "it is no file");
+  if (!std::filesystem::is_regular_file(status)) return Refused(path, "it is not a file");
   const auto size = static_cast<int64_t>(std::filesystem::file_size(path, error));
   if (error || size > limits.max_file_bytes) {
-    return Refused(path, absl::StrCat("it has ", size, " bytes, more than the ",
-                                      limits.max_file_bytes, " that are read"));
+    return Refused(path, absl::StrCat("it has ", size, " bytes, more than the limit of ",
+                                      limits.max_file_bytes));
   }
   std::ifstream file(path, std::ios::binary);
   constexpr size_t kOverlap = 3;
@@ -65,7 +65,7 @@ absl::Status CheckBytes(const std::string& path, const DicomLimits& limits) {
     items += CountItems(piece);
     if (items > limits.max_items) {
       return Refused(path, absl::StrCat("it has more than ", limits.max_items,
-                                        " items; only single images are read"));
+                                        " items; only single images are supported"));
     }
   }
   return absl::OkStatus();
@@ -144,7 +144,7 @@ absl::Status PrepareDcmtk() {
   }();
   if (found) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      "DCMTK's data dictionary is not there: install libdcmtk17, or name dicom.dic in DCMDICTPATH");
+      "DCMTK's data dictionary is missing: install libdcmtk17, or set DCMDICTPATH to dicom.dic");
 }
 
 absl::StatusOr<std::unique_ptr<DcmFileFormat>> LoadDicomHeader(const std::string& path,
@@ -157,14 +157,14 @@ absl::StatusOr<std::unique_ptr<DcmFileFormat>> LoadDicomHeader(const std::string
   DcmMetaInfo meta;
   OFString syntax;
   if (meta.loadFile(name).bad() || meta.findAndGetOFString(DCM_TransferSyntaxUID, syntax).bad()) {
-    return Refused(path, "it is no DICOM file with a meta header");
+    return Refused(path, "it is not a DICOM file with a meta header");
   }
   if (absl::string_view(syntax.c_str()) == kDeflatedLittleEndian) {
-    return Refused(path, "it is deflated, which is not read; store it uncompressed");
+    return Refused(path, "it is deflated, which is not supported; store it uncompressed");
   }
   const OFCondition read = file->loadFileUntilTag(name, EXS_Unknown, EGL_noChange, kReadAtOnceBytes,
                                                   ERM_fileOnly, DCM_PixelData);
-  if (read.bad()) return Refused(path, "it is damaged or cut off, or no DICOM file");
+  if (read.bad()) return Refused(path, "it is damaged, truncated, or not a DICOM file");
   return file;
 }
 

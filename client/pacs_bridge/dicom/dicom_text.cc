@@ -79,7 +79,7 @@ std::string DicomTexts::ToUtf8(const DcmTagKey& tag, const std::string& raw, boo
   if (IsAscii(raw)) return raw;
   if (std::optional<std::string> text = set_.ToUtf8(raw, is_name)) return *std::move(text);
   Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is not in the character set that ",
-                    "SpecificCharacterSet (0008,0005) names, or that is not known"));
+                    "SpecificCharacterSet (0008,0005) names, or that set is unknown"));
   return OnlyAscii(raw);
 }
 

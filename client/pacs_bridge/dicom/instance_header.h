@@ -24,7 +24,7 @@ struct InstanceHeader {
   std::string transfer_syntax_uid = {};
   std::string frame_uid = {};  // of reference
 
-  // The patient's: for the work list and to see whether it changed; never for a log or a name.
+  // The patient's: for the review page and to see whether it changed; never for a log or a name.
   std::string patient_id = {};
   std::string issuer_of_patient_id = {};
   std::string patient_name = {};  // groups of components with "=" between

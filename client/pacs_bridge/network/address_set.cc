@@ -32,7 +32,7 @@ absl::StatusOr<AddressSet> AddressSet::Parse(const std::vector<std::string>& tex
     if (!bits || (parts.size() == 2 &&
                   (!absl::SimpleAtoi(parts[1], &length) || length < 0 || length > 32))) {
       return absl::InvalidArgumentError(absl::StrCat(
-          "'", text, "' is no IPv4 address and no network; write 10.1.2.3 or 10.1.2.0/24"));
+          "'", text, "' is not an IPv4 address or network; write 10.1.2.3 or 10.1.2.0/24"));
     }
     const uint32_t mask = length == 0 ? 0 : ~uint32_t{0} << (32 - length);
     set.networks_.push_back({*bits & mask, mask});

@@ -101,8 +101,8 @@ absl::Status StatusOfStow(absl::string_view peer_name, const std::string& text,
   const Json* const failed = ItemOf(answer, "00081198", instance_uid);
   if (failed == nullptr && may_be_stored) {
     return absl::UnavailableError(absl::StrCat("the PACS '", peer_name,
-                                               "' does not say that it has the object ",
-                                               instance_uid, ": see its log; tried again"));
+                                               "' does not confirm the object ", instance_uid,
+                                               ": see its log; tried again"));
   }
   const int reason = failed == nullptr ? 0 : NumberIn(*failed, "00081197");
   if (reason == kDuplicate) return absl::OkStatus();

@@ -73,7 +73,7 @@ absl::Status CheckAeTitle(const std::string& title) {
   if (is_good) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat("the AE title '", absl::CHexEscape(title),
-                   "' is none: write 1 to 16 characters of ASCII without a backslash"));
+                   "' is invalid: write 1 to 16 ASCII characters without a backslash"));
 }
 
 absl::StatusOr<std::unique_ptr<DimseAssociation>> DimseAssociation::Request(

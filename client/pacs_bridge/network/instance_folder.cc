@@ -27,8 +27,7 @@ absl::Status CheckAnnounced(const AnnouncedInstance& announced, const InstanceHe
       (announced.class_uid.empty() || announced.class_uid == header.class_uid)) {
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError(
-      "the data set is of another object or class than the request says");
+  return absl::InvalidArgumentError("the data set has another object or class than the request");
 }
 
 }  // namespace
@@ -56,7 +55,7 @@ absl::Status InstanceFolder::CheckRoom(int64_t bytes) const {
   }
   return absl::ResourceExhaustedError(
       absl::StrCat(options_.path, ": less than ", options_.watermark_bytes,
-                   " bytes would be free on the disk; make room or lower the watermark"));
+                   " bytes would be free on the disk; free some space or lower the watermark"));
 }
 
 absl::StatusOr<PartialFile> InstanceFolder::NewPartial() const {

@@ -37,7 +37,7 @@ absl::StatusOr<ListeningSocket> ListeningSocket::Listen(const std::string& addre
   place.sin_port = htons(static_cast<uint16_t>(port));
   if (port < 0 || port > 65535 || inet_pton(AF_INET, address.c_str(), &place.sin_addr) != 1) {
     return absl::InvalidArgumentError(
-        absl::StrCat(address, ":", port, " is no IPv4 address and port to listen at"));
+        absl::StrCat(address, ":", port, " is not an IPv4 address and port"));
   }
   ListeningSocket listening(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0),
                             eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), port);

@@ -19,8 +19,7 @@ namespace {
 constexpr size_t kMaxBoundaryCharacters = 70;  // RFC 2046
 
 absl::Status NotMultipart(absl::string_view why) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("the answer cannot be taken apart as multipart/related: ", why));
+  return absl::InvalidArgumentError(absl::StrCat("invalid multipart/related answer: ", why));
 }
 
 // The value of boundary=, quoted or not; empty: none.
@@ -43,7 +42,7 @@ std::string BoundaryOf(absl::string_view content_type) {
 absl::StatusOr<MultipartSplitter> MultipartSplitter::Create(absl::string_view content_type,
                                                             Events events) {
   if (!absl::StartsWithIgnoreCase(content_type, "multipart/related")) {
-    return NotMultipart("it is of another type");
+    return NotMultipart("it has another type");
   }
   const std::string boundary = BoundaryOf(content_type);
   if (boundary.empty() || boundary.size() > kMaxBoundaryCharacters) {
@@ -79,7 +78,7 @@ absl::StatusOr<bool> MultipartSplitter::Step() {
       }
       const size_t line = buffer_.find("\r\n");
       if (line == std::string::npos) {
-        if (buffer_.size() > kMaxHeaderBytes) return NotMultipart("a boundary's line is endless");
+        if (buffer_.size() > kMaxHeaderBytes) return NotMultipart("a boundary's line is too long");
         return false;
       }
       buffer_.erase(0, line);  // the headers may be none: an empty line follows then
@@ -89,7 +88,7 @@ absl::StatusOr<bool> MultipartSplitter::Step() {
     case State::kHeaders: {
       const size_t end = buffer_.find("\r\n\r\n");
       if (end == std::string::npos) {
-        if (buffer_.size() > kMaxHeaderBytes) return NotMultipart("a part has endless headers");
+        if (buffer_.size() > kMaxHeaderBytes) return NotMultipart("a part has too many headers");
         return false;
       }
       buffer_.erase(0, end + 4);

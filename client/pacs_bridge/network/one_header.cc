@@ -60,7 +60,7 @@ absl::Status KeepOneHeader(
   const absl::Status fetched = fetch(*folder, &last);
   if (absl::IsNotFound(fetched) || (fetched.ok() && last.path().empty())) {
     return absl::UnavailableError(
-        "the PACS lists an object of this series and does not send it: see its log");
+        "the PACS lists an object of this series but does not send it: see its log");
   }
   TF_RETURN_IF_ERROR(fetched);
   return CopyHeaderOnly(last.path(), path);
@@ -70,7 +70,7 @@ absl::Status CheckDicomUids(std::initializer_list<std::string> uids) {
   if (std::all_of(uids.begin(), uids.end(), [](const auto& uid) { return IsDicomUid(uid); })) {
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError("a UID of study, series or object is no UID");
+  return absl::InvalidArgumentError("a UID of study, series or object is invalid");
 }
 
 }  // namespace tissueform

@@ -59,9 +59,9 @@ class CommandLoop {
       ended_->released = ASC_acknowledgeRelease(association_).good();
       return false;
     }
-    if (received == DUL_PEERABORTEDASSOCIATION) return End("the sender has aborted it", false);
+    if (received == DUL_PEERABORTEDASSOCIATION) return End("the sender aborted it", false);
     if (received == DIMSE_NODATAAVAILABLE) return End("the sender was silent for too long", true);
-    if (received.bad()) return End("it broke off, or what came was no command", true);
+    if (received.bad()) return End("it was interrupted, or sent no command", true);
     switch (message.CommandField) {
       case DIMSE_C_ECHO_RQ:
         return DIMSE_sendEchoResponse(association_, presentation, &message.msg.CEchoRQ,
@@ -71,7 +71,7 @@ class CommandLoop {
       case DIMSE_C_STORE_RQ:
         return Store(presentation, message.msg.CStoreRQ);
       default:
-        return End("it asked for something else than storing", true);
+        return End("it requested something other than storage", true);
     }
   }
 

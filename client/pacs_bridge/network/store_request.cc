@@ -45,10 +45,10 @@ Uint16 StoreStatus(const absl::Status& status) {
 absl::Status CheckRequest(const AnnouncedInstance& announced, absl::string_view abstract_syntax,
                           const InstanceFolder& folder) {
   if (!IsDicomUid(announced.instance_uid)) {
-    return absl::InvalidArgumentError("an object's UID is no UID");
+    return absl::InvalidArgumentError("an object's UID is invalid");
   }
   if (announced.class_uid != abstract_syntax) {
-    return absl::UnimplementedError("an object is of another class than its presentation context");
+    return absl::UnimplementedError("an object has another class than its presentation context");
   }
   return folder.CheckRoom();
 }
@@ -82,14 +82,14 @@ absl::Status ReceiveStore(T_ASC_Association* association, int presentation_conte
   const OFCondition received = DIMSE_receiveDataSetInFile(
       association, DIMSE_NONBLOCKING, idle_seconds, &presentation, stream.get(), nullptr, nullptr);
   if (received.bad()) {
-    return absl::UnavailableError("it broke off in the middle of an object");
+    return absl::UnavailableError("it was interrupted within an object");
   }
   *status = stream->Close();
   if (status->ok()) *status = folder.Take(*std::move(partial), announced, sink).status();
   T_DIMSE_C_StoreRSP response = {};
   response.DimseStatus = StoreStatus(*status);
   if (DIMSE_sendStoreResponse(association, presentation, &request, &response, nullptr).bad()) {
-    return absl::UnavailableError("it broke off before an answer");
+    return absl::UnavailableError("it was interrupted before an answer");
   }
   return absl::OkStatus();
 }

@@ -58,10 +58,10 @@ absl::StatusOr<std::shared_ptr<DcmTransportLayer>> MakeTlsLayer(const TlsFiles& 
       layer->setPrivateKeyFile(files.key.c_str(), DCF_Filetype_PEM).bad() ||
       !layer->checkPrivateKeyMatchesCertificate() ||
       SSL_CTX_load_verify_locations(context, files.authorities.c_str(), nullptr) != 1) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        files.certificate, ": OpenSSL does not take it, its key or ", files.authorities,
-        " for TLS of the profile BCP 195; keys of RSA need 2048 "
-        "bits"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(files.certificate, ": OpenSSL refuses it, its key or ", files.authorities,
+                     " for TLS of the profile BCP 195; keys of RSA need 2048 "
+                     "bits"));
   }
   layer->setCertificateVerification(DCV_requireCertificate);
   if (!host.empty()) ExpectHost(context, host);

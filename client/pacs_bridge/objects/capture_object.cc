@@ -34,7 +34,7 @@ absl::Status AppendPicture(const std::string& path, CaptureFrames* frames) {
   image.version = PNG_IMAGE_VERSION;
   const std::unique_ptr<png_image, PngFree> freed(&image);
   if (png_image_begin_read_from_file(&image, path.c_str()) == 0) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": it is no PNG that can be read"));
+    return absl::InvalidArgumentError(absl::StrCat(path, ": it is not a readable PNG"));
   }
   if (image.width > kMaxPicturePixels || image.height > kMaxPicturePixels) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": it has more than ", kMaxPicturePixels,
@@ -46,14 +46,14 @@ absl::Status AppendPicture(const std::string& path, CaptureFrames* frames) {
   }
   if (image.width != frames->width || image.height != frames->height) {
     return absl::InvalidArgumentError(
-        absl::StrCat(path, ": it has another size than the pictures before it"));
+        absl::StrCat(path, ": its size differs from the pictures before it"));
   }
   image.format = PNG_FORMAT_RGB;
   const size_t before = frames->rgb.size();
   frames->rgb.resize(before + PNG_IMAGE_SIZE(image));
   const png_color white = {255, 255, 255};
   if (png_image_finish_read(&image, &white, frames->rgb.data() + before, 0, nullptr) == 0) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": it is damaged or cut off"));
+    return absl::InvalidArgumentError(absl::StrCat(path, ": it is damaged or truncated"));
   }
   return absl::OkStatus();
 }

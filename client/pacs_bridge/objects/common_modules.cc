@@ -46,7 +46,7 @@ absl::Status CheckTextLengths(DcmItem* item) {
         object->getLength() > kMaxShortBytes) {
       return absl::InvalidArgumentError(absl::StrCat(
           "the attribute ", object->getTag().toString().c_str(), " of the source has ",
-          object->getLength(), " bytes, which no object can hold; mend it in the PACS"));
+          object->getLength(), " bytes, which no object can hold; correct it in the PACS"));
     }
   }
   return absl::OkStatus();
@@ -128,9 +128,9 @@ DicomTimes TimesOf(DcmDataset* source, absl::Time made) {
 absl::Status CheckSource(DcmDataset* source) {
   for (const DcmTagKey& tag : {DCM_StudyInstanceUID, DCM_FrameOfReferenceUID}) {
     if (!IsDicomUid(ValueOf(source, tag))) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("the source has no usable ", DcmTag(tag).getTagName(),
-                       "; what is predicted cannot be put beside it"));
+      return absl::InvalidArgumentError(absl::StrCat("the source has no usable ",
+                                                     DcmTag(tag).getTagName(),
+                                                     "; the prediction cannot refer to it"));
     }
   }
   DcmDataset copy;

@@ -19,7 +19,7 @@ namespace {
 
 absl::Status CheckUid(const std::string& what, const std::string& uid) {
   if (IsDicomUid(uid)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(what, " is no UID; take that of NewDicomUid"));
+  return absl::InvalidArgumentError(absl::StrCat(what, " is not a UID; use NewDicomUid"));
 }
 
 absl::Status CheckUids(const PredictionObjectsInput& input) {
@@ -30,7 +30,7 @@ absl::Status CheckUids(const PredictionObjectsInput& input) {
                                 found == input.uids.end() ? "" : found->second));
     if (!seen.insert(found->second).second) {
       return absl::InvalidArgumentError(
-          absl::StrCat("the UID of \"", key, "\" is that of another object; make one for each"));
+          absl::StrCat("the UID of \"", key, "\" belongs to another object; make one for each"));
     }
   }
   TF_RETURN_IF_ERROR(CheckUid("the UID of the source series", input.source_series_uid));
@@ -49,12 +49,12 @@ bool IsNumber(const v1::Measure& measure) {
 absl::Status CheckMeasures(const std::vector<v1::Measure>& measures) {
   if (measures.size() > kMaxReportedMeasures) {
     return absl::InvalidArgumentError(absl::StrCat(measures.size(), " measures are more than the ",
-                                                   kMaxReportedMeasures, " that are taken"));
+                                                   kMaxReportedMeasures, " allowed"));
   }
   for (const v1::Measure& measure : measures) {
     if (IsNumber(measure) && (measure.unit() == "mm" || measure.unit() == "deg")) continue;
     return absl::InvalidArgumentError(
-        "a measure has a number that is none, or a unit other than mm and deg");
+        "a measure has an invalid number, or a unit other than mm and deg");
   }
   return absl::OkStatus();
 }
@@ -94,13 +94,13 @@ std::string SeriesKeyOf(const std::string& object_key) {
 absl::Status CheckPredictionInput(const PredictionObjectsInput& input) {
   if (input.source_images.empty() || input.source_images.size() > kMaxSourceImages) {
     return absl::InvalidArgumentError(
-        absl::StrCat("the case has ", input.source_images.size(), " source images, and 1 to ",
-                     kMaxSourceImages, " are taken; name those that it was built from"));
+        absl::StrCat("the case has ", input.source_images.size(), " source images; 1 to ",
+                     kMaxSourceImages, " are allowed; name the images that it was built from"));
   }
   if (input.pictures.empty() || input.pictures.size() > kMaxPictures) {
     return absl::InvalidArgumentError(
-        absl::StrCat("there are ", input.pictures.size(), " pictures, and 1 to ", kMaxPictures,
-                     " are taken; `tissueform case render` makes them"));
+        absl::StrCat("there are ", input.pictures.size(), " pictures; 1 to ", kMaxPictures,
+                     " are allowed; `tissueform case render` makes them"));
   }
   const auto is_distance = [](double mm) { return std::isfinite(mm) && mm >= 0; };
   const auto vertices = static_cast<size_t>(input.contents.mesh.vertex_count);
@@ -108,10 +108,10 @@ absl::Status CheckPredictionInput(const PredictionObjectsInput& input) {
       (input.band_mm.size() != vertices ||
        !std::all_of(input.band_mm.begin(), input.band_mm.end(), is_distance))) {
     return absl::InvalidArgumentError(
-        "the band of uncertainty is not one distance for each vertex of the case's mesh");
+        "the band of uncertainty needs one distance for each vertex of the case's mesh");
   }
   if (input.device_serial.empty()) {
-    return absl::InvalidArgumentError("the bridge has no serial; name it");
+    return absl::InvalidArgumentError("the bridge has no serial number");
   }
   TF_RETURN_IF_ERROR(CheckMeasures(input.measures));
   return CheckUids(input);

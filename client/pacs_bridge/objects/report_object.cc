@@ -56,8 +56,8 @@ void AddOrigin(const PredictionObjectsInput& input, ReportTree* tree) {
   AddPlain(OwnTerm("MESH_SHA256", "SHA-256 of the mesh"),
            std::string(absl::StripPrefix(prediction.mesh(), "meshes/")), tree);
   AddPlain(OwnTerm("PLAN_SHA256", "SHA-256 of the plan"), input.contents.plan_sha256, tree);
-  AddPlain(OwnTerm("RECIPE_SHA256", "SHA-256 of stiffness and regions"), prediction.recipe_sha256(),
-           tree);
+  AddPlain(OwnTerm("RECIPE_SHA256", "SHA-256 of assigning stiffness and regions"),
+           prediction.recipe_sha256(), tree);
   tree->Close();
 }
 

@@ -62,8 +62,8 @@ absl::Status CheckVersion(Database& database, int64_t version) {
   TF_ASSIGN_OR_RETURN(const int64_t application, PragmaOf(database, "PRAGMA application_id"));
   if (version == kQueueVersion && application == kQueueApplicationId) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      absl::StrCat("queue ", database.path(), " is of version ", version, ", this program knows ",
-                   kQueueVersion, "; take the program that has made it, or another --state-dir"));
+      absl::StrCat("queue ", database.path(), " has version ", version, ", this program supports ",
+                   kQueueVersion, "; use the program that made it, or another --state-dir"));
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ absl::Status ExportRows::Confirm(const std::string& name, const std::string& dig
             .Bind(name)
             .Run());
     if (database.total_changes() > before) return absl::OkStatus();
-    return absl::FailedPreconditionError("the export does not wait for a person's word");
+    return absl::FailedPreconditionError("the export does not wait for confirmation");
   });
 }
 

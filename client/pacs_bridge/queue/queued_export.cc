@@ -29,8 +29,7 @@ absl::StatusOr<QueuedExport> ExportOf(const Database::Query& row) {
   size_t number = 0;
   while (number < kExportStates.size() && state != kExportStates[number]) ++number;
   if (number == kExportStates.size()) {
-    return absl::DataLossError(
-        "the queue has an export in a state that this program does not know");
+    return absl::DataLossError("the queue has an export in an unknown state");
   }
   found.state = static_cast<BridgeExportState>(number);
   found.note = TextOf(row, column++);

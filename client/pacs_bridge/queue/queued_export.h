@@ -14,7 +14,7 @@ namespace tissueform {
 
 // How far an export has come; one step after the other, each of which may be repeated.
 enum class BridgeExportState {
-  kAsked,      // its patient is shown in the work list
+  kAsked,      // its patient is shown in the review page
   kConfirmed,  // by a person
   kFetched,    // the patient's header is there, and says what the person has seen
   kWritten,    // all objects lie in its folder

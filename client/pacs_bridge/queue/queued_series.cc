@@ -22,7 +22,7 @@ absl::StatusOr<SeriesState> StateOf(absl::string_view name) {
   for (size_t i = 0; i < kSeriesStates.size(); ++i) {
     if (name == kSeriesStates[i]) return static_cast<SeriesState>(i);
   }
-  return absl::DataLossError("the queue has a series in a state that this program does not know");
+  return absl::DataLossError("the queue has a series in an unknown state");
 }
 
 }  // namespace

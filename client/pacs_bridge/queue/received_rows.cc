@@ -124,8 +124,7 @@ absl::StatusOr<QueuedSeries> ReceivedRows::Add(const QueuedStudy& study, const Q
     TF_ASSIGN_OR_RETURN(std::optional<QueuedSeries> found,
                         FindSeries(database, kByUid, series.uid));
     if (!found.has_value() || found->study_uid != series.study_uid) {
-      return absl::FailedPreconditionError(
-          "a series is known as one of another study; look at what sends it");
+      return absl::FailedPreconditionError("a series belongs to another study; check its sender");
     }
     bool any_new = false;
     for (const QueuedImage& image : images) {
@@ -193,7 +192,7 @@ absl::Status ReceivedRows::UpdateStep(const QueuedSeries& series, SeriesState be
             .Bind(series.images)
             .Run());
     if (database.total_changes() > changes) return KeepCase(database, series);
-    return absl::AbortedError("more images have come meanwhile");
+    return absl::AbortedError("more images have arrived");
   });
 }
 

@@ -40,10 +40,11 @@ absl::StatusOr<std::string> ReadReviewPassword(const std::string& path) {
   const fs::file_status status = fs::status(path, error);
   if (!fs::is_regular_file(status)) {
     return absl::InvalidArgumentError(
-        absl::StrCat(path, " cannot be read; write the work list's password to it"));
+        absl::StrCat(path, " cannot be read; write the review page's password to it"));
   }
   if ((status.permissions() & (fs::perms::group_all | fs::perms::others_all)) != fs::perms::none) {
-    return absl::InvalidArgumentError(absl::StrCat(path, " may be read by others; chmod 600 it"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, " can be read by other users; chmod 600 it"));
   }
   std::ifstream file(path);
   std::string password(kMaxPasswordBytes, '\0');
@@ -51,8 +52,7 @@ absl::StatusOr<std::string> ReadReviewPassword(const std::string& path) {
   password.resize(static_cast<size_t>(file.gcount()));
   absl::StripAsciiWhitespace(&password);
   if (password.size() >= kLeastPasswordCharacters) return password;
-  return absl::InvalidArgumentError(absl::StrCat(path, " holds fewer than ",
-                                                 kLeastPasswordCharacters,
+  return absl::InvalidArgumentError(absl::StrCat(path, " has fewer than ", kLeastPasswordCharacters,
                                                  " characters; write a longer password to it"));
 }
 

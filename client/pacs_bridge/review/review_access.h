@@ -9,7 +9,7 @@
 
 namespace tissueform {
 
-// Who may see the work list, as its server asks it of a request's headers.
+// Who may see the review page, as its server asks it of a request's headers.
 
 // Takes as long for every text of one length. REQUIRES: a secret that is not empty.
 bool IsSameSecret(const std::string& given, const std::string& secret);

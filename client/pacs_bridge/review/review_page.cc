@@ -44,7 +44,7 @@ const char* WordsOf(SeriesState state) {
 const char* WordsOf(BridgeExportState state) {
   switch (state) {
     case BridgeExportState::kAsked:
-      return "waits for your word";
+      return "waits for confirmation";
     case BridgeExportState::kConfirmed:
     case BridgeExportState::kFetched:
     case BridgeExportState::kWritten:
@@ -107,8 +107,8 @@ std::string ExportArticle(const ReviewExport& waiting, const ReviewPageOptions& 
   }
   if (asked && !waiting.of.study.patient.readable) {
     absl::StrAppend(&html,
-                    "<p class=\"problem\" role=\"alert\">A text of this patient cannot be read as "
-                    "it was meant: compare with the PACS before you store.</p>");
+                    "<p class=\"problem\" role=\"alert\">A text of this patient could not be "
+                    "decoded: compare with the PACS before you store.</p>");
   }
   absl::StrAppend(&html, PatientList(waiting.of.study), Pictures(waiting));
   const std::string link = PlannerLink(options.planner_url, waiting.queued.case_name);
@@ -142,8 +142,8 @@ std::string ReviewPage(const ReviewQueue& list, const ReviewPageOptions& options
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
-      "<title>Work list - Tissueform</title><link rel=\"stylesheet\" href=\"/style.css\"></head>"
-      "<body><header><h1>Work list</h1><p class=\"quiet\">Research software, not a medical "
+      "<title>Review page - Tissueform</title><link rel=\"stylesheet\" href=\"/style.css\"></head>"
+      "<body><header><h1>Review page</h1><p class=\"quiet\">Research software, not a medical "
       "device.</p><p><a href=\"/\">Refresh</a></p></header><main>";
   if (!options.notice.empty()) {
     absl::StrAppend(&html, "<p role=\"status\" class=\"notice",
@@ -153,14 +153,15 @@ std::string ReviewPage(const ReviewQueue& list, const ReviewPageOptions& options
   absl::StrAppend(&html,
                   "<section aria-labelledby=\"exports\"><h2 id=\"exports\">Predictions for "
                   "the PACS</h2>");
-  if (list.exports.empty()) absl::StrAppend(&html, "<p class=\"quiet\">None waits.</p>");
+  if (list.exports.empty())
+    absl::StrAppend(&html, "<p class=\"quiet\">No predictions are waiting.</p>");
   for (const ReviewExport& waiting : list.exports) {
     absl::StrAppend(&html, ExportArticle(waiting, options));
   }
   absl::StrAppend(&html,
                   "</section><section aria-labelledby=\"cases\"><h2 id=\"cases\">Cases</h2>");
   if (list.series.empty()) {
-    absl::StrAppend(&html, "<p class=\"quiet\">Nothing was received yet.</p>");
+    absl::StrAppend(&html, "<p class=\"quiet\">Nothing received yet.</p>");
   } else {
     absl::StrAppend(&html,
                     "<div class=\"wide\" role=\"region\" aria-labelledby=\"cases\" "
@@ -173,7 +174,7 @@ std::string ReviewPage(const ReviewQueue& list, const ReviewPageOptions& options
   }
   if (list.passed_over > 0) {
     absl::StrAppend(&html, "<p class=\"quiet\">", list.passed_over,
-                    " other series were received and not chosen: <code>tissueform-pacs "
+                    " other series were received but not chosen: <code>tissueform-pacs "
                     "series</code> says why.</p>");
   }
   return absl::StrCat(html, "</section></main></body></html>\n");

@@ -62,7 +62,7 @@ class HttpReviewServer final : public ReviewServer {
       port_ = options_.port;
     }
     if (port_ <= 0) {
-      return absl::UnavailableError(absl::StrCat("the work list cannot listen on ",
+      return absl::UnavailableError(absl::StrCat("the review page cannot listen on ",
                                                  options_.address, ":", options_.port,
                                                  "; name another --review-listen"));
     }
@@ -94,7 +94,7 @@ class HttpReviewServer final : public ReviewServer {
          {"Cross-Origin-Resource-Policy", "same-origin"}});
     server_.set_exception_handler(
         [](const Request&, Response& response, const std::exception_ptr&) {
-          Refuse(&response, 500, "this request cannot be answered");
+          Refuse(&response, 500, "invalid request");
         });
   }
 
@@ -105,7 +105,7 @@ class HttpReviewServer final : public ReviewServer {
     });
     server_.Get("/", [this](const Request& request, Response& response) {
       const bool confirmed = request.has_param("confirmed");
-      Show(confirmed ? "Confirmed: it is being stored." : "", false, &response);
+      Show(confirmed ? "Confirmed. It is being stored." : "", false, &response);
     });
     server_.Get("/style.css", [](const Request&, Response& response) {
       response.set_content(std::string(ReviewStyle()), "text/css; charset=utf-8");
@@ -126,13 +126,13 @@ class HttpReviewServer final : public ReviewServer {
 
   bool MayCome(const Request& request, Response* response) const {
     if (!hosts_.contains(HostWithoutPort(request.get_header_value("Host")))) {
-      Refuse(response, 421, "this is not the host that was asked for; see --review-host");
+      Refuse(response, 421, "unknown host; see --review-host");
       return false;
     }
     if (password_.empty() || IsBasicPassword(request.get_header_value("Authorization"), password_))
       return true;
-    response->set_header("WWW-Authenticate", "Basic realm=\"Tissueform work list\"");
-    Refuse(response, 401, "the work list wants its password");
+    response->set_header("WWW-Authenticate", "Basic realm=\"Tissueform review page\"");
+    Refuse(response, 401, "the review page requires its password");
     return false;
   }
 
@@ -157,16 +157,16 @@ class HttpReviewServer final : public ReviewServer {
   void Confirm(const Request& request, Response* response) {
     if (!IsFromHere(request) || !IsSameSecret(request.get_param_value("token"), form_token_)) {
       return Refuse(response, 403,
-                    "this form is not from the work list, or the bridge was started "
-                    "anew; load the work list again");
+                    "this form is not from the review page, or the bridge was "
+                    "restarted; reload the page");
     }
     const std::string shown = request.get_param_value("patient");
     const absl::Status status = ConfirmAsShown(request.get_param_value("export"), shown);
     if (!status.ok()) {
       response->status = 409;
       return Show(
-          "Not stored: this prediction does not wait any longer, or its patient's data "
-          "have changed since the page was loaded. Look again.",
+          "Not stored: this prediction is no longer waiting, or its patient's data "
+          "changed after the page was loaded. Check again.",
           true, response);
     }
     if (confirmed_) confirmed_();
@@ -180,7 +180,7 @@ class HttpReviewServer final : public ReviewServer {
     TF_ASSIGN_OR_RETURN(const QueuedSeries series, received.GetByCase(queued.case_name));
     TF_ASSIGN_OR_RETURN(const QueuedStudy study, received.GetStudy(series.study_uid));
     if (DigestOf(study.patient) != shown) {
-      return absl::AbortedError("the patient is another one than the page has shown");
+      return absl::AbortedError("the patient differs from the one shown");
     }
     return exports.Confirm(name, shown);
   }
@@ -220,7 +220,7 @@ absl::StatusOr<std::unique_ptr<ReviewServer>> ReviewServer::Start(const ReviewOp
     TF_ASSIGN_OR_RETURN(password, ReadReviewPassword(options.token_file));
   } else if (!IsLoopbackAddress(options.address)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("the work list shows names of patients: at ", options.address,
+        absl::StrCat("the review page shows patient names: at ", options.address,
                      " it needs --review-token-file, or listen on 127.0.0.1"));
   }
   auto server =

@@ -24,9 +24,9 @@ struct ReviewOptions {
   std::string planner_url = {};
 };
 
-// The work list: a small web server for those who may see names. It shows what the queue holds, and
-// takes a person's word that a prediction is stored in the study of the patient that the page has
-// shown; it does nothing else.
+// The review page: a small web server for those who may see names. It shows what the queue holds,
+// and takes a person's word that a prediction is stored in the study of the patient that the page
+// has shown; it does nothing else.
 //
 // A request is answered only when its Host is one of ours (421), with the password where one is set
 // (401); a form only when it comes from a page of ours (403): by the token in it, and by Origin

@@ -156,8 +156,8 @@ std::string DescribeFacts(const SeriesFacts& facts) {
   constexpr std::array<const char*, 3> kKernels = {"soft kernel", "sharp kernel",
                                                    "kernel of unknown kind"};
   const std::string aside = facts.set_aside > 0
-                                ? absl::StrFormat("; left aside: %d other object%s",
-                                                  facts.set_aside, facts.set_aside > 1 ? "s" : "")
+                                ? absl::StrFormat("; ignored: %d other object%s", facts.set_aside,
+                                                  facts.set_aside > 1 ? "s" : "")
                                 : "";
   if (facts.multi_frame) {
     return absl::StrFormat("%d multi-frame images (Enhanced CT)%s", facts.images, aside);

@@ -26,10 +26,10 @@ std::string OtherModality(const std::string& modality) {
         return absl::ascii_isupper(c) || absl::ascii_isdigit(c);
       });
   if (modality == "MR") {
-    return "it is of modality MR, which has no Hounsfield units to tell bone and skin by; send a "
+    return "its modality is MR, which has no Hounsfield units for bone and skin; send a "
            "CT";
   }
-  return absl::StrCat("it is of modality ", is_name && !modality.empty() ? modality : "unknown");
+  return absl::StrCat("its modality is ", is_name && !modality.empty() ? modality : "unknown");
 }
 
 bool HasAnyWord(const std::string& text, const std::vector<std::string>& words) {
@@ -50,12 +50,12 @@ void CheckSlices(const SeriesFacts& series, const SeriesRule& rule,
     add(absl::StrCat(series.missing, " slices are missing between the first and the last"));
   }
   if (series.duplicates > 0) {
-    add(absl::StrCat(series.duplicates, " images lie where another one lies"));
+    add(absl::StrCat(series.duplicates, " images have the position of another one"));
   }
   if (series.frames_of_reference > 1) {
-    add(absl::StrCat("its images are of ", series.frames_of_reference, " frames of reference"));
+    add(absl::StrCat("its images have ", series.frames_of_reference, " frames of reference"));
   }
-  if (series.orientations > 1) add("its images are turned differently");
+  if (series.orientations > 1) add("its images have different orientations");
   if (rule.axial_only && series.plane != SliceOrientation::kAxial) add("its slices are not axial");
   if (series.spacing_mm > rule.max_spacing_mm + kSameMm) {
     add(absl::StrFormat("its slices are %.2f mm apart, more than %.2f", series.spacing_mm,
@@ -75,23 +75,22 @@ void CheckSlices(const SeriesFacts& series, const SeriesRule& rule,
 // of the others are not known.
 void CheckHounsfield(const SeriesFacts& series, std::vector<std::string>* against) {
   if (series.without_hounsfield == 0) return;
-  against->push_back(
-      series.without_hounsfield < series.images
-          ? absl::StrCat(series.without_hounsfield, " of its ", series.images,
-                         " images do not say how their values become Hounsfield units, the others "
-                         "do; have the scanner send the series again")
-          : "it does not say how its values become Hounsfield units, as a cone-beam CT may not; a "
-            "rule with \"hounsfield\": false and a recipe with hu_offset take it");
+  against->push_back(series.without_hounsfield < series.images
+                         ? absl::StrCat(series.without_hounsfield, " of its ", series.images,
+                                        " images have no Hounsfield calibration, the others "
+                                        "have one; send the series again")
+                         : "it has no Hounsfield calibration, like some cone-beam CTs; a "
+                           "rule with \"hounsfield\": false and a recipe with hu_offset accept it");
 }
 
 }  // namespace
 
 std::string WhatIsAgainst(const SeriesFacts& series, const SeriesRule& rule) {
   if (series.modality != rule.modality) return OtherModality(series.modality);
-  if (series.localiser) return "it is a localiser (scout)";
+  if (series.localiser) return "it is a localizer (scout)";
   if (series.multi_frame) {
-    return "its images have several frames each (Enhanced CT), which rules do not measure; choose "
-           "it by tissueform-pacs build, or have single-frame CT images sent";
+    return "its images are multi-frame (Enhanced CT), which rules do not measure; choose "
+           "it with tissueform-pacs build, or send single-frame CT images";
   }
   std::vector<std::string> against;
   if (rule.hounsfield) CheckHounsfield(series, &against);
@@ -102,7 +101,7 @@ std::string WhatIsAgainst(const SeriesFacts& series, const SeriesRule& rule) {
     against.emplace_back("its description has none of the rule's words");
   }
   if (HasAnyWord(series.description, rule.description_lacks)) {
-    against.emplace_back("its description has a word that the rule does not want");
+    against.emplace_back("its description has a word that the rule excludes");
   }
   return absl::StrJoin(against, "; ");
 }

@@ -110,7 +110,7 @@ std::vector<SeriesVerdict> PickSeries(const std::vector<SeriesFacts>& study,
           absl::StrCat("by ", NameOfRule(rules, best_rule), ": ", DescribeFacts(study[i]));
     } else if (verdict.rule == best_rule) {
       verdict.reason =
-          absl::StrCat("the chosen one has ", Compare(study[*best], study[i], rule).words);
+          absl::StrCat("the chosen series has ", Compare(study[*best], study[i], rule).words);
     } else if (verdict.rule >= 0) {
       verdict.reason = absl::StrCat(NameOfRule(rules, best_rule), " takes another one");
     }

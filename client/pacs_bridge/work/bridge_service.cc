@@ -81,7 +81,7 @@ void BridgeService::Tell(const absl::Status& status, const std::string& line) {
 void BridgeService::TakeIn() {
   const absl::StatusOr<std::vector<std::string>> changed = parts_.intake->Settle();
   if (!changed.ok()) {
-    Tell(changed.status(), "what was received cannot be put into the queue");
+    Tell(changed.status(), "received objects cannot be queued");
   } else if (!changed->empty()) {
     ReceivedRows rows(parts_.queue);
     for (const std::string& key : *changed) {
@@ -98,7 +98,7 @@ void BridgeService::TakeIn() {
   threads_.BeginStep(kIntake);
   const absl::StatusOr<int> deleted = DeleteOld(parts_.queue, parts_.retention, std::time(nullptr));
   if (!deleted.ok() || *deleted > 0) {
-    Tell(deleted.status(), "deleted what is older than it is kept");
+    Tell(deleted.status(), "deleted expired data");
   }
 }
 
@@ -147,7 +147,7 @@ void BridgeService::TakeHeard() {
 bool BridgeService::TakeNow(const v1::Export& told) {
   if (!take_retries_.Due(told.name())) return false;
   const absl::Status status = parts_.exports->Take(told);
-  if (!status.ok()) Tell(status, "an export cannot be taken into the queue");
+  if (!status.ok()) Tell(status, "an export cannot be queued");
   if (IsTransient(status)) {
     take_retries_.Failed(told.name());
     return false;
@@ -189,9 +189,9 @@ void BridgeService::LookForTakenBack(const std::vector<QueuedExport>& all) {
     // The watch tells of a server that is away, and all are looked at again.
     if (IsTransient(still_asked.status())) return;
     if (!still_asked.ok()) {
-      Tell(still_asked.status(), absl::StrCat(queued.name, " cannot be looked for"));
+      Tell(still_asked.status(), absl::StrCat(queued.name, " cannot be checked"));
     } else if (!*still_asked) {
-      Tell(absl::OkStatus(), absl::StrCat(queued.name, " is asked for no longer"));
+      Tell(absl::OkStatus(), absl::StrCat(queued.name, " was withdrawn"));
     }
   }
 }
@@ -238,7 +238,7 @@ void BridgeService::WatchServer() {
       cancelled);
   if (stopping()) return;
   watch_retries_.Failed(kWatch);
-  Tell(status, "the watch of exports has ended; it is taken up again");
+  Tell(status, "the watch of exports ended; restarting it");
 }
 
 }  // namespace tissueform

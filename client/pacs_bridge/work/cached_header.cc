@@ -56,7 +56,7 @@ absl::StatusOr<PatientIdentity> AskWhoseItIs(PacsClient* pacs, const std::string
 
 absl::Status SeriesIsGone() {
   return absl::FailedPreconditionError(
-      "the PACS has the series of this case no longer; nothing is stored");
+      "the PACS no longer has the series of this case; nothing is stored");
 }
 
 absl::Status Refused(const absl::Status& status) {
@@ -66,7 +66,7 @@ absl::Status Refused(const absl::Status& status) {
 absl::StatusOr<PatientIdentity> PatientIn(const std::string& path, const QueuedSeries& series) {
   TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(path));
   if (header.study_uid != series.study_uid || header.series_uid != series.uid) {
-    return absl::FailedPreconditionError("the PACS gave a header of another series");
+    return absl::FailedPreconditionError("the PACS returned a header of another series");
   }
   return IdentityOf(header);
 }
@@ -77,7 +77,7 @@ absl::StatusOr<FoundPatient> TakeKeptHeader(PacsClient* pacs, const CachedHeader
   const int64_t age_s = std::time(nullptr) - series.first_s;
   if (!series.has_header || age_s > known.lifetime.count()) {
     return absl::FailedPreconditionError(
-        "the PACS gives no header, and none is kept any longer; allow C-GET there, or have it send "
+        "the PACS returns no header, and none is kept; allow C-GET there, or send "
         "the series again");
   }
   FoundPatient found;
@@ -85,7 +85,7 @@ absl::StatusOr<FoundPatient> TakeKeptHeader(PacsClient* pacs, const CachedHeader
   TF_ASSIGN_OR_RETURN(found.patient, AskWhoseItIs(pacs, series.study_uid, kept));
   if (!(found.patient == kept)) {
     found.has_header = false;
-    found.remark = "the PACS gives no header, and the one that is kept names another patient";
+    found.remark = "the PACS returns no header, and the kept one names another patient";
     return found;
   }
   std::error_code failed;
@@ -94,7 +94,7 @@ absl::StatusOr<FoundPatient> TakeKeptHeader(PacsClient* pacs, const CachedHeader
   found.remark = absl::StrCat(
       "stored with the header that was received on ",
       absl::FormatTime("%Y-%m-%d", absl::FromUnixSeconds(series.first_s), absl::UTCTimeZone()),
-      ": the PACS gives none");
+      ": the PACS returns none");
   return found;
 }
 

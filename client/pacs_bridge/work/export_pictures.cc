@@ -72,8 +72,8 @@ absl::StatusOr<std::vector<double>> ExportPictures::AskBand(const QueuedExport& 
   if (!band.ok() && MayCome(band.status()) && queued.attempts < kMaxBandAttempts) return band;
   if (warn_) {
     warn_(
-        absl::StrCat(queued.name, " is written without its band of uncertainty: ",
-                     band.ok() ? "it is not one number for each vertex" : band.status().message()));
+        absl::StrCat(queued.name, " is written without a band of uncertainty: ",
+                     band.ok() ? "it needs one number for each vertex" : band.status().message()));
   }
   return std::vector<double>();
 }

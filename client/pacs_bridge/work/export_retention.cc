@@ -21,8 +21,8 @@ absl::StatusOr<int> DeleteOldExports(BridgeQueue* queue, const RetentionOptions&
   const auto days = std::chrono::duration_cast<std::chrono::hours>(options.keep_asked).count() / 24;
   TF_ASSIGN_OR_RETURN(int changed,
                       rows.FailAsked(now_s - std::chrono::seconds(options.keep_asked).count(),
-                                     absl::StrCat("nobody has confirmed the patient for ", days,
-                                                  " days; ask for it once more in the planner")));
+                                     absl::StrCat("the patient was not confirmed for ", days,
+                                                  " days; request it again in the planner")));
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedExport> all, rows.List());
   for (const QueuedExport& queued : all) {
     if (!IsOver(queued.done_s, options.keep_exports, now_s)) continue;

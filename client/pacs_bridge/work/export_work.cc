@@ -56,8 +56,7 @@ absl::Status ExportWork::Take(const v1::Export& told) {
   const absl::StatusOr<QueuedSeries> series = received_.GetByCase(told.case_());
   if (absl::IsNotFound(series.status())) {
     if (options_.inform) {
-      options_.inform(
-          absl::StrCat(told.name(), " is of a case of another bridge, and left to that"));
+      options_.inform(absl::StrCat(told.name(), " has a case of another bridge and is left to it"));
     }
     return absl::OkStatus();
   }
@@ -82,7 +81,7 @@ absl::Status ExportWork::Take(const v1::Export& told) {
   if (queued.state != BridgeExportState::kAsked) return absl::OkStatus();
   TF_FAULT_POINT("export.asked");
   return server_->UpdateExport(queued.name, v1::EXPORT_STATE_CONFIRMATION,
-                               "waits for a person at the work list of the bridge", 0);
+                               "waits for confirmation on the bridge's review page", 0);
 }
 
 absl::StatusOr<bool> ExportWork::IsStillAsked(const QueuedExport& queued) {
@@ -173,7 +172,7 @@ absl::Status ExportWork::AskAnew(QueuedExport* queued, const std::string& study_
                                  const FoundPatient& now) {
   // The server first: what is told of the change must not be compared with what was written by it.
   TF_RETURN_IF_ERROR(server_->UpdateExport(queued->name, v1::EXPORT_STATE_CONFIRMATION,
-                                           "the patient's data have changed: waits for a person",
+                                           "the patient's data changed: waits for confirmation",
                                            0));
   TF_FAULT_POINT("export.patient_told");
   TF_ASSIGN_OR_RETURN(const QueuedStudy study, received_.GetStudy(study_uid));
@@ -205,7 +204,7 @@ absl::StatusOr<ExportMaterial> ExportWork::Gather(const QueuedExport& queued) {
   TF_ASSIGN_OR_RETURN(material.prediction, server_->ReadPrediction(queued.prediction));
   if (material.prediction.description.mesh() != material.case_file.mesh.name) {
     return absl::FailedPreconditionError(
-        "the prediction is of another mesh than its case; predict in the case again, and send "
+        "the prediction has a different mesh from its case; predict in the case again, and send "
         "that");
   }
   TF_ASSIGN_OR_RETURN(material.asked, server_->GetExport(queued.name));
@@ -296,7 +295,7 @@ absl::Status ExportWork::Send(QueuedExport* queued) {
   objects.erase(std::remove_if(objects.begin(), objects.end(), never_sent), objects.end());
   TF_RETURN_IF_ERROR(SendMissing(*queued, &objects));
   if (CountSent(objects) != static_cast<int>(objects.size()) || objects.empty()) {
-    return absl::UnavailableError("the PACS has not taken all objects");
+    return absl::UnavailableError("the PACS did not accept all objects");
   }
   queued->state = BridgeExportState::kSent;
   return absl::OkStatus();

@@ -7,7 +7,7 @@ namespace tissueform {
 
 absl::Status IntakeSink::Keep(const ReceivedInstance& instance) {
   if (instance.novelty == ReceivedInstance::Novelty::kChanged) {
-    return absl::AlreadyExistsError("an image has come again with other bytes");
+    return absl::AlreadyExistsError("an image was received again with other bytes");
   }
   {
     MutexLock lock(mutex_);

@@ -61,21 +61,21 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
 }
 
 std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& prediction) {
-  if (!contents.material_ranges) return "the case gives no ranges of the material";
+  if (!contents.material_ranges) return "the case has no ranges of the material";
   if (!TellsOfMaterial(prediction.model())) {
     return "only predictions of linear_elastic and neo_hookean have a band of uncertainty";
   }
   v1::CreateSessionRequest request;
   if (!request.ParseFromString(contents.session_request)) return "";
   if (!IsOfTheCase(prediction, request)) {
-    return "it was predicted with another mesh or stiffness than the case's";
+    return "its mesh or stiffness differs from the case's";
   }
   const auto turns_too_far = [](const v1::HandlePose& pose) {
     const double turn_rad = ToNamedPose(pose).pose.rotation_vector.norm();
     return !HasBand(turn_rad, kLargestBandRotationRad);
   };
   if (std::any_of(prediction.poses().begin(), prediction.poses().end(), turns_too_far)) {
-    return "a segment turns by more than 30 degrees, which linear elasticity takes for strain";
+    return "a segment turns by more than 30 degrees, which linear elasticity treats as strain";
   }
   return "";
 }

@@ -26,7 +26,7 @@ absl::StatusOr<FoundPatient> FetchPatientHeader(PacsClient* pacs, const CachedHe
 
 std::string WhatHasChanged(const PatientIdentity& seen, const PatientIdentity& now) {
   if (!now.readable) {
-    return "the name is in a character set that is not known here; compare with the PACS";
+    return "the name has an unknown character set; compare with the PACS";
   }
   if (seen.id != now.id || seen.issuer != now.issuer) {
     return "the PACS names another patient ID than the images that were received (a merged or "

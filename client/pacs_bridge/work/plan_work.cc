@@ -46,7 +46,7 @@ absl::Status LinkImages(const std::vector<QueuedImage>& images, const std::strin
   for (size_t i = 0; i < images.size(); ++i) {
     if (images[i].file.empty()) {
       return absl::FailedPreconditionError(
-          "the images of the series are deleted; have the PACS send them again");
+          "the images of the series were deleted; send them again from the PACS");
     }
     fs::create_hard_link(images[i].file, absl::StrCat(folder, "/", i, ".dcm"), error);
     if (error) return FileError(error.value(), "cannot link an image into", folder);
@@ -58,7 +58,7 @@ absl::StatusOr<std::string> ReadCaseFile(const std::string& path) {
   std::string bytes;
   TF_RETURN_IF_ERROR(ReadInPieces(path, [&bytes](absl::string_view piece) {
     if (bytes.size() + piece.size() > kMaxCaseBytes) {
-      return absl::ResourceExhaustedError("a case is larger than any that is read");
+      return absl::ResourceExhaustedError("a case is larger than the limit");
     }
     absl::StrAppend(&bytes, piece);
     return absl::OkStatus();
@@ -100,9 +100,8 @@ absl::Status PlanWork::Step(QueuedSeries* series) {
       status = Publish(series);
       break;
     default:
-      return absl::FailedPreconditionError(absl::StrCat("series ", series->key, " is ",
-                                                        SeriesStateName(before),
-                                                        ": it has no step that is next"));
+      return absl::FailedPreconditionError(absl::StrCat(
+          "series ", series->key, " is ", SeriesStateName(before), ": it has no next step"));
   }
   if (absl::IsCancelled(status)) return status;
   if (status.ok()) {
@@ -200,7 +199,7 @@ absl::Status PlanWork::Publish(QueuedSeries* series) {
   TF_ASSIGN_OR_RETURN(const std::string name, server_->Publish(bytes, TitleOfSeries(series->key)));
   TF_FAULT_POINT("plan.published");
   if (name != series->case_name) {
-    return absl::DataLossError("the server calls the case by another name than its bytes have");
+    return absl::DataLossError("the server's name of the case does not match its bytes");
   }
   series->state = SeriesState::kPublished;
   series->done_s = std::time(nullptr);

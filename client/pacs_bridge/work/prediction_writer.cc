@@ -49,7 +49,7 @@ PredictionObjectsInput InputOf(const ExportMaterial& material) {
   input.band_mm = material.band_mm;
   if (input.band_mm.empty()) {
     input.why_no_band = WhyNoMaterialBand(input.contents, input.prediction);
-    if (input.why_no_band.empty()) input.why_no_band = "the server could not tell it";
+    if (input.why_no_band.empty()) input.why_no_band = "the server could not compute it";
   }
   input.measures.assign(material.asked.measures().begin(), material.asked.measures().end());
   input.uids = material.uids;

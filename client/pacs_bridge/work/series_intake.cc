@@ -31,9 +31,9 @@ std::string ModalityOf(const std::string& text) {
   return is_modality ? text : "?";
 }
 
-constexpr char kCameLate[] = "images came after its plan was built, which lacks them";
+constexpr char kCameLate[] = "images arrived after its plan was built; the plan lacks them";
 constexpr char kOfAnotherStudy[] =
-    "images of the same series name another study, too; look at what sends them";
+    "images of the same series name another study; check their sender";
 
 bool IsBuilt(SeriesState state) {
   return state == SeriesState::kBuilt || state == SeriesState::kPacked ||
@@ -131,9 +131,8 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::PutSeries(
   TF_ASSIGN_OR_RETURN(const QueuedStudy known, rows_.GetStudy(study.uid));
   const bool same_patient = one_patient && known.patient == study.patient;
   if (!same_patient && !HasPlan(kept->state)) {
-    TF_RETURN_IF_ERROR(
-        Write(*kept, SeriesState::kFailed,
-              "its images say different things of their patient; look at what sends them"));
+    TF_RETURN_IF_ERROR(Write(*kept, SeriesState::kFailed,
+                             "its images name different patients; check their sender"));
     return std::vector<std::string>{kept->key};
   }
   if (IsBuilt(kept->state) && before.ok() && kept->images > before->images) {
@@ -247,10 +246,9 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
       busy.insert(series.study_uid);
       continue;
     }
-    TF_RETURN_IF_ERROR(Write(series, *judged,
-                             *judged == SeriesState::kIncomplete
-                                 ? "it has stopped midway; what is missing completes it"
-                                 : ""));
+    TF_RETURN_IF_ERROR(Write(
+        series, *judged,
+        *judged == SeriesState::kIncomplete ? "it is incomplete; send the missing images" : ""));
     changed.push_back(series.key);
     MutexLock lock(mutex_);
     if (const auto study = studies_.find(series.study_uid); study != studies_.end()) {
@@ -303,8 +301,8 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::ChooseOfStudy(const std::
     if (series.state == SeriesState::kComplete) changed.push_back(series.key);
     if (has_plan) {
       if (series.state == SeriesState::kComplete) {
-        TF_RETURN_IF_ERROR(
-            Write(series, SeriesState::kPassedOver, "another series of the study came before"));
+        TF_RETURN_IF_ERROR(Write(series, SeriesState::kPassedOver,
+                                 "another series of the study was received first"));
       }
       continue;
     }
@@ -344,8 +342,8 @@ absl::Status SeriesIntake::KeepHeader(QueuedSeries* series) {
 absl::Status SeriesIntake::Choose(QueuedSeries series, const std::string& recipe,
                                   const std::string& reason) {
   if (series.state == SeriesState::kReceiving || series.state == SeriesState::kIncomplete) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "series ", series.key, " is ", SeriesStateName(series.state), ": nothing is built of it"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("series ", series.key, " is ", SeriesStateName(series.state), ": not built"));
   }
   if (recipe.empty()) return absl::FailedPreconditionError("no recipe; give --recipe FILE");
   TF_RETURN_IF_ERROR(KeepHeader(&series));

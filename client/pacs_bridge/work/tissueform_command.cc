@@ -67,9 +67,9 @@ absl::Status RunTissueform(const std::vector<std::string>& arguments, absl::stri
   const auto latest = std::chrono::steady_clock::now() + most_time;
   std::optional<ChildEnd> end;
   while (!(end = child->WaitFor(kCancelPause)).has_value()) {
-    if (IsReadable(cancel)) return absl::CancelledError(absl::StrCat(what, " was broken off"));
+    if (IsReadable(cancel)) return absl::CancelledError(absl::StrCat(what, " was interrupted"));
     if (std::chrono::steady_clock::now() > latest) {
-      return absl::DeadlineExceededError(absl::StrCat(what, " took too long and was ended"));
+      return absl::DeadlineExceededError(absl::StrCat(what, " took too long and was stopped"));
     }
   }
   if (end->exit_code == 0) return absl::OkStatus();
@@ -81,7 +81,7 @@ absl::Status RunTissueform(const std::vector<std::string>& arguments, absl::stri
   }
   if (end->exit_code > kSignalled) {
     return absl::FailedPreconditionError(
-        absl::StrCat(what, " failed: it was ended by signal ", end->exit_code - kSignalled));
+        absl::StrCat(what, " failed: stopped by signal ", end->exit_code - kSignalled));
   }
   return absl::FailedPreconditionError(absl::StrCat(what, " failed: ", LastLine(log)));
 }

@@ -130,7 +130,7 @@ async function openLink(name: string): Promise<void> {
     openFollower(await fetchCase(name), onlySession, expireTime === undefined ? null : new Date(1000 * Number(expireTime.seconds)));
   } catch (thrown) {
     if (toCallError(thrown).code !== Code.Unauthenticated) throw thrown;
-    showProblem("There is nothing to follow", LINK_HAS_ENDED, []);
+    showProblem("Nothing to follow", LINK_HAS_ENDED, []);
   }
 }
 

@@ -50,7 +50,7 @@ class StrictnessCheck : public nlohmann::json_sax<Json> {
     Level& level = levels_.back();
     level.key = key;
     if (level.keys.insert(key).second) return true;
-    return Refuse(absl::StrCat("key \"", key, "\" stands twice at ", Pointer(levels_.size() - 1),
+    return Refuse(absl::StrCat("key \"", key, "\" appears twice at ", Pointer(levels_.size() - 1),
                                "; keep one of them"));
   }
 

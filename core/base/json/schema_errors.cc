@@ -114,7 +114,7 @@ std::string UnknownKey(const std::string& key, const std::string& pointer, const
   if (newest.contains("properties") && newest.at("properties").contains(key)) {
     return absl::StrCat("key \"", key, "\" at ", pointer, " came with version ",
                         SinceVersion(newest.at("properties").at(key)),
-                        " of the format; write that as \"version\", or leave the key out");
+                        " of the format; write that as \"version\", or remove the key");
   }
   return absl::StrCat("unknown key \"", key, "\" at ", pointer, "; ", AllowedKeys(subschema));
 }

@@ -75,7 +75,7 @@ absl::StatusOr<Ends> OpenRequest() {
 
 absl::StatusOr<Ends> OpenAnswer() {
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) return SystemError("cannot make a pipe");
+  if (pipe2(ends, O_CLOEXEC) != 0) return SystemError("cannot create a pipe");
   return Ends{Descriptor(ends[1]), Descriptor(ends[0])};
 }
 

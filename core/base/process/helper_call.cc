@@ -25,7 +25,7 @@ absl::Status ExplainEnd(const HelperCall& call, const ChildEnd& end) {
   if (end.exit_code < 0 && end.signal == 0) {
     return absl::InternalError(
         absl::StrCat(call.what,
-                     " ended early, and the system does not say how: it keeps no account "
+                     " ended early for an unknown reason: the system keeps no account "
                      "of children while SIGCHLD is ignored"));
   }
   if (call.explain) return call.explain(end);

@@ -61,7 +61,7 @@ absl::StatusOr<IsolationLimits> ReceiveLimits(PipeReceiver* request) {
   TF_ASSIGN_OR_RETURN(const int64_t version, request->Number(INT64_MAX));
   if (version != kHelperCallVersion) {
     return absl::FailedPreconditionError(
-        "a helper program is of another version; install all programs of one build");
+        "a helper program has another version; install all programs of one build");
   }
   TF_ASSIGN_OR_RETURN(limits.max_memory_bytes, request->Number(INT64_MAX));
   TF_ASSIGN_OR_RETURN(const int64_t seconds, request->Number(kMaxSeconds));
@@ -114,7 +114,7 @@ int RunHelperProgram(const std::function<void(const IsolationLimits& limits, Pip
                                               PipeSender* answer)>& work) {
   if (IsStartedByHand()) {
     constexpr absl::string_view kExplanation =
-        "this program is a part of tissueform, which starts it; it does nothing by itself\n";
+        "this program is started by tissueform and does nothing by itself\n";
     return write(STDERR_FILENO, kExplanation.data(), kExplanation.size()) < 0 ? 1 : kUsageError;
   }
   std::signal(SIGPIPE, SIG_IGN);  // the answer to a caller that has gone is an error of PipeSender

@@ -48,7 +48,7 @@ void PipeSender::Outcome(const absl::Status& status) {
 }
 
 absl::Status PipeReceiver::BrokenOff() {
-  return absl::DataLossError("what the child process sent breaks off or makes no sense");
+  return absl::DataLossError("the data from the child process is incomplete or invalid");
 }
 
 absl::Status PipeReceiver::Bytes(void* data, size_t size) {
@@ -87,7 +87,7 @@ absl::Status PipeReceiver::Outcome() {
 
 absl::Status PipeReceiver::Reserve(int64_t count, int64_t size) {
   if (count > bytes_left_ / size) {
-    return absl::ResourceExhaustedError("what was read is larger than the memory limit");
+    return absl::ResourceExhaustedError("the data is larger than the memory limit");
   }
   bytes_left_ -= count * size;
   return absl::OkStatus();

@@ -101,7 +101,7 @@ absl::Status FindSkinLandmarks(const HeadSegmentation& head, Landmarks* landmark
   const auto left = profile.SkinAt(mouth_mm, kCornerFromMidlineMm);
   const auto right = profile.SkinAt(mouth_mm, -kCornerFromMidlineMm);
   if (!left.has_value() || !right.has_value()) {
-    return absl::InvalidArgumentError("the skin beside the mouth is not in view");
+    return absl::InvalidArgumentError("the skin next to the mouth is not in view");
   }
   l.mouth_corner = {*left, *right};
   return absl::OkStatus();

@@ -174,7 +174,7 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   result.bone = WithoutSpecks(dense, options.smallest_bone_mm3);
   result.streaks_mm3 = RemoveStreaks(&result);
   TF_RETURN_IF_ERROR(CheckBone(result.bone, options.bone_above_hu));
-  TellStage(tell, "looking for skin", 0.8);
+  TellStage(tell, "checking for skin", 0.8);
   result.bare_fraction = BareFraction(result.head, result.bone);
   TF_RETURN_IF_ERROR(CheckSkin(result.bare_fraction));
   return result;

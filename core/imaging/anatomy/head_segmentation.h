@@ -40,7 +40,7 @@ struct HeadSegmentation {
   HeadSegmentationOptions options;
 
   double streaks_mm3 = 0;  // dense as bone, but taken for what metal's streaks have left
-  double removed_mm3 = 0;  // tissue that was taken away: tubes, cords, head rest
+  double removed_mm3 = 0;  // removed objects: tubes, cords, head rest
   std::vector<AttachedObject> objects;  // of it what touched the head, by falling volume
   double bare_fraction =
       0;  // of the outer surface: nearer than 2.5 mm to bone; a living head 0..0.1

@@ -214,7 +214,7 @@ RegionOfInterest DefaultRegion(const Landmarks& landmarks, const GridGeometry& g
 absl::StatusOr<SoftTissue> ExtractSoftTissue(
     const HeadSegmentation& head, const LabelGrid& bone_labels, const Landmarks& landmarks,
     const RegionOfInterest& region, const SoftTissueOptions& options, const StageFunction& tell) {
-  TellStage(tell, "parting soft tissue from the brain", 0);
+  TellStage(tell, "separating soft tissue from the brain", 0);
   const std::vector<Plane> planes = region.planes();
   const LabelGrid soft = SoftVoxels(head.head, bone_labels);
   const double joint_z_mm = std::max(landmarks.condyle.left.z(), landmarks.condyle.right.z());

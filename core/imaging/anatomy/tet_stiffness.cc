@@ -128,7 +128,7 @@ absl::Status CheckMesh(const TetMesh& mesh, const GridGeometry& grid) {
   for (Eigen::Index tet = 0; tet < mesh.num_tets(); ++tet) {
     if (!LiesInGrid(grid.ToVoxels(Barycentre(mesh, tet)), grid)) {
       return absl::InvalidArgumentError(
-          absl::StrCat("tet ", tet, " lies outside the CT: its stiffness cannot be known"));
+          absl::StrCat("tet ", tet, " is outside the CT: its stiffness is unknown"));
     }
   }
   return absl::OkStatus();

@@ -146,11 +146,11 @@ absl::StatusOr<std::vector<float>> ValuesOf(const DicomHeader& header, const gdc
   const size_t count = static_cast<size_t>(header.rows) * static_cast<size_t>(header.columns) *
                        static_cast<size_t>(header.num_frames);
   if (image.GetBufferLength() != count * sizeof(T)) {
-    return CannotDecode(header, "its pixels are not as many as rows and columns say");
+    return CannotDecode(header, "its number of pixels does not match rows and columns");
   }
   std::vector<T> values(count);
   if (!image.GetBuffer(reinterpret_cast<char*>(values.data()))) {
-    return CannotDecode(header, "its pixels are cut off or damaged");
+    return CannotDecode(header, "its pixels are truncated or damaged");
   }
   return std::vector<float>(values.begin(), values.end());
 }
@@ -195,25 +195,25 @@ std::string DescribeKind(const DicomHeader& header) {
     case DicomKind::kCtSlice:
       return "a CT slice";
     case DicomKind::kLocaliser:
-      return "a localiser (scout view)";
+      return "a localizer (scout view)";
     case DicomKind::kSecondaryCapture:
       return "a photograph or copy of a screen (secondary capture)";
     case DicomKind::kOtherModality:
-      return header.modality == "CT" ? "no plain CT image"
+      return header.modality == "CT" ? "not a conventional CT image"
                                      : absl::StrCat("of modality ", header.modality);
     case DicomKind::kMultiFrame:
-      return "a multi-frame image that does not say where its frames lie: export it as single "
+      return "a multi-frame image without frame positions: export it as single "
              "slices";
     case DicomKind::kColour:
-      return "a colour image";
+      return "a color image";
     case DicomKind::kDeflated:
-      return "a deflated file, which is not read: export it in another transfer syntax";
+      return "a deflated file, which is not supported: export it in another transfer syntax";
     case DicomKind::kNoImage:
       return "no image";
     case DicomKind::kDirectory:
       return "a directory (DICOMDIR)";
     case DicomKind::kDamaged:
-      return "a DICOM file that is cut off or damaged";
+      return "a truncated or damaged DICOM file";
   }
   return "unknown";
 }
@@ -254,11 +254,11 @@ absl::StatusOr<std::vector<float>> DecodeDicomPixels(const DicomHeader& header,
   std::istringstream stream(contents);
   gdcm::ImageReader reader;
   reader.SetStream(stream);
-  if (!reader.Read()) return CannotDecode(header, "it is cut off or damaged");
+  if (!reader.Read()) return CannotDecode(header, "it is truncated or damaged");
   const gdcm::Image& image = reader.GetImage();
   const gdcm::PixelFormat format = image.GetPixelFormat();
   if (!HoldsAllPixels(header, image, contents)) {
-    return CannotDecode(header, "it is cut off");
+    return CannotDecode(header, "it is truncated");
   }
   switch (format.GetScalarType()) {
     case gdcm::PixelFormat::UINT8:
@@ -276,7 +276,7 @@ absl::StatusOr<std::vector<float>> DecodeDicomPixels(const DicomHeader& header,
     case gdcm::PixelFormat::INT32:
       return ValuesOf<int32_t>(header, image);
     default:
-      return CannotDecode(header, "its pixels are of an unusual type");
+      return CannotDecode(header, "its pixels have an unsupported type");
   }
 }
 

@@ -225,7 +225,7 @@ std::string DescribeStrangers(const std::string& series,
                               const std::vector<DicomHeader>& strangers) {
   std::map<std::string, std::vector<DicomHeader>> by_kind;
   for (const DicomHeader& stranger : strangers) by_kind[DescribeKind(stranger)].push_back(stranger);
-  return absl::StrCat("left aside in ", series, ", not CT slices: ",
+  return absl::StrCat("ignored in ", series, ", not CT slices: ",
                       absl::StrJoin(by_kind, ", ", [](std::string* out, const auto& kind) {
                         absl::StrAppend(out, FilesOf(kind.second), " (", kind.first, ")");
                       }));
@@ -258,7 +258,7 @@ void AddNotes(const Candidate& chosen, const std::vector<SliceGroup>& aside, Dic
   for (size_t s = 1; s < chosen.scans.size(); ++s) {
     stack->notes.push_back(absl::StrCat("left out: ", DescribeScan(chosen.scans[s])));
   }
-  if (!aside.empty()) stack->notes.push_back(absl::StrCat("left aside: ", DescribeAll(aside)));
+  if (!aside.empty()) stack->notes.push_back(absl::StrCat("ignored: ", DescribeAll(aside)));
 }
 
 }  // namespace

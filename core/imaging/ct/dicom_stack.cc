@@ -44,7 +44,7 @@ absl::Status CheckRescale(const DicomHeader& slice, bool any_states, bool has_of
   const bool usable = slice.rescale_intercept && slice.rescale_slope.value_or(1) != 0;
   if (usable || (!any_states && has_offset)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
-      NameOf(slice), " does not say how its values become HU (RescaleSlope, RescaleIntercept)",
+      NameOf(slice), " has no calibration to HU (RescaleSlope, RescaleIntercept)",
       any_states ? "; export the series again" : "; state \"hu_offset\" in the recipe"));
 }
 
@@ -53,7 +53,7 @@ absl::Status CheckTags(const std::vector<DicomHeader>& slices, bool has_offset) 
   for (const DicomHeader& slice : slices) {
     if (const char* const missing = MissingTag(slice)) {
       return absl::InvalidArgumentError(
-          absl::StrCat(NameOf(slice), " has no usable ", missing, ": it cannot be placed"));
+          absl::StrCat(NameOf(slice), " has no usable ", missing, ": its position is unknown"));
     }
     TF_RETURN_IF_ERROR(CheckRescale(slice, any_states, has_offset));
   }
@@ -148,7 +148,7 @@ absl::Status CheckGaps(const std::vector<DicomHeader>& slices, const std::vector
     if (gaps[i] < kSamePositionMm) {
       return absl::InvalidArgumentError(absl::StrCat(
           NameOf(slices[i]), " and ", Place(slices[i + 1]),
-          " lie at the same place, and nothing in their headers tells two scans apart: leave the "
+          " have the same position, and their headers do not distinguish two scans: keep only the "
           "files of one scan in the folder"));
     }
     if (gaps[i] > kMaxGapMm) {
@@ -191,7 +191,8 @@ std::string MissingSlices(const std::vector<DicomHeader>& slices, const std::vec
 std::string UnevenNote(const std::vector<DicomHeader>& slices, const std::vector<double>& gaps) {
   const auto [least, most] = std::minmax_element(gaps.begin(), gaps.end());
   return absl::StrFormat(
-      "the slices lie unevenly, %.2f to %.2f mm apart, usually %.2f mm: values between them are "
+      "the slices are unevenly spaced, %.2f to %.2f mm apart, usually %.2f mm: values between them "
+      "are "
       "interpolated%s",
       *least, *most, UpperMedian(gaps), MissingSlices(slices, gaps));
 }

@@ -74,7 +74,7 @@ absl::StatusOr<SeriesChoice> ChoiceOf(const std::string& path, const Folder& fol
     if (file.path == path) return SeriesChoice{file.file_number, std::nullopt, options.join_series};
   }
   return absl::InvalidArgumentError(
-      "the file is no DICOM file, and its ending is none of .nii .nii.gz .nrrd .nhdr .mha .mhd");
+      "the file is not a DICOM file, and its ending is not .nii .nii.gz .nrrd .nhdr .mha or .mhd");
 }
 
 // Where a slice lies, as far as a copy of its file would say the same.
@@ -108,9 +108,9 @@ absl::Status CheckNoneDamaged(const std::vector<DicomHeader>& files, const Dicom
   if (stack.slice_origins_mm.empty()) return absl::OkStatus();
   for (const DicomHeader& file : files) {
     if (file.kind != DicomKind::kDamaged) continue;
-    return absl::InvalidArgumentError(absl::StrCat(
-        NameOf(file), " is ", DescribeKind(file), ", and ", stack.notes.back(),
-        "; export the series again, or take that file out of the folder to go without it"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(NameOf(file), " is ", DescribeKind(file), ", and ", stack.notes.back(),
+                     "; export the series again, or remove that file to continue without it"));
   }
   return absl::OkStatus();
 }
@@ -134,15 +134,15 @@ absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOption
     return absl::Status(arranged.code(),
                         absl::StrCat(arranged.message(),
                                      "; or leave \"join_series\": \"always\" out of the "
-                                     "recipe, without which scans are told apart"));
+                                     "recipe, so that scans are separated"));
   }
   TF_RETURN_IF_ERROR(arranged);
   TF_RETURN_IF_ERROR(CheckNoneDamaged(folder.files, stack));
   if (copies > 0) {
-    stack.notes.push_back(absl::StrCat("left aside: ", copies, " files that are copies of others"));
+    stack.notes.push_back(absl::StrCat("ignored: ", copies, " files that are copies of others"));
   }
   if (folder.others > 0) {
-    stack.notes.push_back(absl::StrCat("left aside: ", folder.others, " files that are no DICOM"));
+    stack.notes.push_back(absl::StrCat("ignored: ", folder.others, " files that are not DICOM"));
   }
   return stack;
 }
@@ -220,7 +220,7 @@ absl::Status CheckOffsetIsNeeded(const CtVolume& volume) {
   return absl::InvalidArgumentError(
       "the files state how their values become HU (RescaleSlope, RescaleIntercept), and so they "
       "are "
-      "HU of a body in air; take \"hu_offset\" out of the recipe");
+      "HU of a body in air; remove \"hu_offset\" from the recipe");
 }
 
 }  // namespace
@@ -235,7 +235,7 @@ absl::StatusOr<CtVolume> ReadDicomVolume(const std::string& path, const CtReadOp
     TF_RETURN_IF_ERROR(CheckOffsetIsNeeded(volume));
     volume.provenance.notes.push_back(absl::StrCat(
         "the files state a rescale (RescaleIntercept ", *stack.slices.front().rescale_intercept,
-        ") after which their values are no HU: \"hu_offset\" of the recipe is added"));
+        ") that does not result in HU: \"hu_offset\" of the recipe is added"));
   }
   TF_RETURN_IF_ERROR(ReadSlices(stack, options.hu_offset.value_or(0), max_bytes, &volume));
   return volume;

@@ -65,7 +65,7 @@ absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* byte
   std::string contents(static_cast<size_t>(bytes), '\0');
   std::ifstream stream(path, std::ios::binary);
   if (!stream.read(contents.data(), bytes)) {
-    return absl::InvalidArgumentError("a file cannot be read, or became shorter meanwhile");
+    return absl::InvalidArgumentError("a file cannot be read, or became shorter");
   }
   return contents;
 }

@@ -65,7 +65,7 @@ absl::Status WithoutAir(const HuHistogram& histogram, std::optional<double> hu_o
                      ", which looks like HU + 1024; add \"hu_offset\": -1024 to the recipe"));
   }
   return absl::InvalidArgumentError(absl::StrCat(
-      "the values are not HU of a body in air: almost none lies below ", kAirBelow,
+      "the values are not HU of a body in air: almost none is below ", kAirBelow,
       hu_offset ? absl::StrCat(" after adding hu_offset ", *hu_offset, "; correct it in the recipe")
                 : "; state \"hu_offset\" in the recipe"));
 }
@@ -93,7 +93,7 @@ absl::Status CheckHu(const std::vector<int16_t>& hu, std::optional<double> hu_of
   }
   if (ShareBetween(histogram, kMatterFrom, kHighest) < kLeastShare) {
     return absl::InvalidArgumentError(
-        absl::StrCat("the values show nothing but air: almost none lies above ", kMatterFrom, " HU",
+        absl::StrCat("the values show only air: almost none is above ", kMatterFrom, " HU",
                      hu_offset ? absl::StrCat(" after adding hu_offset ", *hu_offset,
                                               "; correct it in the recipe or leave it out")
                                : "; if an offset was applied twice, state \"hu_offset\" in the "

@@ -15,7 +15,8 @@ constexpr char kFrom[] = "RAI";
 constexpr double kSameDirection = 1e-6;
 
 constexpr char kExplanation[] =
-    "three letters for where in the patient its x, y and z grow toward: L or R, A or P, S or I "
+    "three letters, the patient directions in which its x, y and z increase: L or R, A or P, S or "
+    "I "
     "(\"LPS\": left, back, head)";
 
 // The patient's axis of a letter, or -1.
@@ -29,7 +30,7 @@ int AxisOf(char letter) {
 absl::Status Contradicts(const std::string& axes, const std::string& stated) {
   return absl::InvalidArgumentError(
       absl::StrCat("\"axes\": \"", axes, "\" of the recipe contradicts the file, whose axes are \"",
-                   stated, "\"; correct the recipe or leave the key out"));
+                   stated, "\"; correct the recipe or remove the key"));
 }
 
 }  // namespace

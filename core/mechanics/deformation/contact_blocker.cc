@@ -167,7 +167,7 @@ std::string Describe(const ContactBlocker& obstacle, const ConstraintSet& constr
   const bool is_alone = obstacle.first == obstacle.second;
   const std::string other = NameOf(std::min(obstacle.first, obstacle.second), constraints);
   if (!(obstacle.volume_ratio > 0)) {
-    return absl::StrCat(mover, " would pass through ", is_alone ? "tissue beside it" : other);
+    return absl::StrCat(mover, " would pass through ", is_alone ? "adjacent tissue" : other);
   }
   return absl::StrCat("the tissue ", is_alone ? "beside " : "between ", mover,
                       is_alone ? "" : absl::StrCat(" and ", other), " is squeezed to ",

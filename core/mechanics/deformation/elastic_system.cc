@@ -58,7 +58,7 @@ absl::Status CheckCondition(double condition, double poisson_ratio) {
       "elastic system is too ill-conditioned for a reliable answer (condition estimate ", condition,
       ", limit ", ElasticSystem::kLargestCondition, ") with Poisson's ratio ",
       absl::StrFormat("%.15g", poisson_ratio),
-      "; take a ratio further below 0.5, or a narrower range of stiffness"));
+      "; use a ratio further below 0.5, or a narrower range of stiffness"));
 }
 
 // Prescribed displacements of the 12 affine motions of a handle, 3 #constrained by 12.

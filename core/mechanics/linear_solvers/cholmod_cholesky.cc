@@ -185,7 +185,7 @@ class CholmodCholesky : public SparseCholesky {
     cholmod_sparse view = ViewLowerTriangle(A);
     std::vector<int32_t> order = OrderOfUnknowns(node_order_, b);
     factor_ = cholmod_analyze_p(&view, order.data(), nullptr, 0, &common_);
-    return ToStatus(common_.status, "analysing the linear system");
+    return ToStatus(common_.status, "analyzing the linear system");
   }
 
   const std::vector<int32_t>& node_order() const override { return node_order_; }
@@ -199,7 +199,7 @@ class CholmodCholesky : public SparseCholesky {
     cholmod_sparse view = ViewLowerTriangle(A);
     CopyOnThisThread();
     cholmod_factorize(&view, factor_, &common_);
-    return ToStatus(common_.status, "factorising the linear system");
+    return ToStatus(common_.status, "factorizing the linear system");
   }
 
   absl::Status Solve(const Eigen::MatrixXd& rhs, Eigen::MatrixXd* solution) const override {

@@ -51,7 +51,7 @@ class EigenCholesky : public SparseCholesky {
     try {
       factor_.analyzePattern(A);
     } catch (const std::bad_alloc&) {
-      return absl::ResourceExhaustedError("out of memory while analysing the linear system");
+      return absl::ResourceExhaustedError("out of memory while analyzing the linear system");
     }
     return absl::OkStatus();
   }
@@ -69,7 +69,7 @@ class EigenCholesky : public SparseCholesky {
     try {
       factor_.factorize(A);
     } catch (const std::bad_alloc&) {
-      return absl::ResourceExhaustedError("out of memory while factorising the linear system");
+      return absl::ResourceExhaustedError("out of memory while factorizing the linear system");
     }
     if (factor_.info() != Eigen::Success) {
       return WithReason(absl::FailedPreconditionError("linear system is not positive definite"),

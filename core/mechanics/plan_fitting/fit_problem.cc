@@ -68,15 +68,15 @@ class Resolver {
     }
     if (problem_.unknowns.empty()) {
       return absl::InvalidArgumentError(
-          request_.symmetric ? "nothing may move; give a handle bounds for a turn about x or a "
+          request_.symmetric ? "no free numbers; give a handle bounds for a turn about x or a "
                                "translation along y or z, which symmetry leaves"
-                             : "nothing may move; give a handle bounds for a rotation or a "
+                             : "no free numbers; give a handle bounds for a rotation or a "
                                "translation");
     }
     if (problem_.unknowns.size() > kMaxFitUnknowns) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(problem_.unknowns.size(), " numbers may move; at most ", kMaxFitUnknowns,
-                       " are fitted (18 for three segments); let fewer move"));
+      return absl::InvalidArgumentError(absl::StrCat(problem_.unknowns.size(),
+                                                     " free numbers; at most ", kMaxFitUnknowns,
+                                                     " are supported (18 for three segments)"));
     }
     return absl::OkStatus();
   }

@@ -30,8 +30,7 @@ absl::Status CheckWish(const FitTargetRequest& target, const std::string& what) 
                      (target.displacement_mm.has_value() ? 1 : 0) +
                      (target.direction.has_value() ? 1 : 0);
   if (wishes != 1) {
-    return Refuse(what,
-                  "it must say what is wanted in one way: move_mm, along with by_mm, or to_mm");
+    return Refuse(what, "it must have one goal: move_mm, along with by_mm, or to_mm");
   }
   if (target.direction.has_value() && target.direction->isZero(0)) {
     return Refuse(what, "its direction has no length");
@@ -42,7 +41,7 @@ absl::Status CheckWish(const FitTargetRequest& target, const std::string& what) 
 absl::Status CheckTarget(const FitTargetRequest& target) {
   const std::string what = absl::StrCat("target \"", target.name, "\"");
   if (target.point_mm.has_value() != target.vertices.empty()) {
-    return Refuse(what, "it must say one point: a point on the skin, or a place");
+    return Refuse(what, "it must have one location: a point on the skin, or a place");
   }
   if (!IsFinite(target.point_mm) || !IsFinite(target.position_mm) ||
       !IsFinite(target.displacement_mm) || !IsFinite(target.direction) ||
@@ -52,7 +51,7 @@ absl::Status CheckTarget(const FitTargetRequest& target) {
   if (!(target.weight > 0 && target.weight <= kMaxTargetWeight)) {
     return Refuse(what,
                   absl::StrCat("its weight is ", target.weight, "; it must be above 0 and at most ",
-                               kMaxTargetWeight, "; leave out a target that does not count"));
+                               kMaxTargetWeight, "; remove a target without weight"));
   }
   return CheckWish(target, what);
 }
@@ -77,12 +76,12 @@ absl::Status CheckRanges(const std::array<FitFreedom::Range, 3>& ranges, const R
     }
     if (lower > upper) {
       return Refuse(what, absl::StrCat("the bounds of its ", number,
-                                       " cross: the lower one is above the upper one"));
+                                       " are reversed: the lower one is above the upper one"));
     }
     constexpr double kRounding = 1 + 1e-12;  // degrees became radians
     if (std::max(-lower, upper) > kind.most * kRounding) {
-      return Refuse(what, absl::StrCat("the bounds of its ", number, " go beyond ",
-                                       kind.most_in_words, "; give nearer ones"));
+      return Refuse(what, absl::StrCat("the bounds of its ", number, " exceed ", kind.most_in_words,
+                                       "; give tighter ones"));
     }
   }
   return absl::OkStatus();
@@ -111,7 +110,7 @@ absl::Status CheckSettings(const FitRequest& request) {
 
 absl::Status CheckFitRequest(const FitRequest& request) {
   if (request.targets.empty()) {
-    return absl::InvalidArgumentError("there is no target; say what the skin is to do");
+    return absl::InvalidArgumentError("there are no targets");
   }
   if (request.targets.size() > kMaxFitTargets) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -130,7 +129,7 @@ absl::Status CheckFitRequest(const FitRequest& request) {
     TF_RETURN_IF_ERROR(CheckTarget(target));
     if (!names.insert(target.name).second) {
       return Refuse(absl::StrCat("target \"", target.name, "\""),
-                    "there are two of that name; rename one");
+                    "the name is not unique; rename it");
     }
   }
   std::set<std::string> handles;

@@ -42,7 +42,7 @@ absl::StatusOr<Halfedges> ToHalfedges(const TriangleMesh& surface) {
   if (!pmp::is_polygon_soup_a_polygon_mesh(triangles)) pmp::orient_polygon_soup(points, triangles);
   if (!pmp::is_polygon_soup_a_polygon_mesh(triangles)) {
     return absl::InvalidArgumentError(
-        "the triangles are no surface with two sides; it cannot be made coarser");
+        "the triangles are not an orientable surface; it cannot be decimated");
   }
   Halfedges mesh;
   pmp::polygon_soup_to_polygon_mesh(points, triangles, mesh);

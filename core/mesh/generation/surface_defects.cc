@@ -45,8 +45,8 @@ void FindDuplicates(const TriangleIndices& triangles, SurfaceDefects* defects) {
     duplicates.push_back(f);
     Mark(f, TriangleFlaw::kDuplicate, defects);
   }
-  AddDefect({"duplicate_triangles", Severity::kError,
-             "triangles have the corners of an earlier one", "triangle", "remove them"},
+  AddDefect({"duplicate_triangles", Severity::kError, "triangles repeat an earlier one", "triangle",
+             "remove them"},
             duplicates, &defects->defects);
 }
 
@@ -60,15 +60,15 @@ void FindIntersections(const TriangleMesh& surface, SurfaceDefects* defects) {
   }
   defects->num_intersecting_pairs = static_cast<int64_t>(found.pairs.size());
   defects->found_all_pairs = found.complete;
-  AddDefect({"intersecting_triangles", Severity::kError, "triangles go through each other",
-             "triangle", "take them apart, or remesh the surface (`mesh generate --remesh-mm`)"},
+  AddDefect({"intersecting_triangles", Severity::kError, "triangles intersect", "triangle",
+             "separate them, or remesh the surface (`mesh generate --remesh-mm`)"},
             {triangles.begin(), triangles.end()}, &defects->defects);
 }
 
 void FindInwardFacing(SurfaceDefects* defects) {
   if (defects->report.enclosed_volume_mm3 >= 0) return;
   MeshDefect defect{"inward_facing", Severity::kWarning, 1, {}, ""};
-  defect.explanation = "the closed surface faces inwards; its inside is taken all the same";
+  defect.explanation = "the closed surface faces inward; its inside is used";
   defects->defects.push_back(defect);
 }
 

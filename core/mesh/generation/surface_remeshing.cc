@@ -95,7 +95,7 @@ absl::StatusOr<RemeshedSurface> RemeshAndRepair(const TriangleMesh& surface,
       return absl::InvalidArgumentError(
           absl::StrCat("the remeshed surface still has ", intersections.pairs.size(),
                        " pairs of triangles that go through each other after ", options.max_repairs,
-                       " repairs; ask for shorter edges, or smooth the surface"));
+                       " repairs; request shorter edges, or smooth the surface"));
     }
     current = FinerAround(mesh, bad, current);
   }

@@ -82,14 +82,14 @@ void CopyRegions(const std::vector<MeshRegion>& regions, tetgenio* io) {
 absl::Status ExplainThrown(int code) {
   switch (code) {
     case 1:
-      return absl::ResourceExhaustedError("TetGen has no memory left; allow more or larger tets");
+      return absl::ResourceExhaustedError(
+          "TetGen is out of memory; allow more memory or larger tets");
     case 3:
-      return absl::InvalidArgumentError(
-          "TetGen finds triangles that go through each other; remesh the surface");
+      return absl::InvalidArgumentError("TetGen finds intersecting triangles; remesh the surface");
     case 4:
     case 5:
       return absl::InvalidArgumentError(
-          "TetGen finds parts that are too close to tell apart; remesh the surface coarser");
+          "TetGen finds parts that are too close to each other; remesh the surface coarser");
     default:
       return absl::InvalidArgumentError(
           absl::StrCat("TetGen gives up (its code ", code, "); remesh the surface"));

@@ -146,13 +146,13 @@ absl::Status WrongStart(const std::string& path, const Sample& sample, int64_t b
       !FormatOfStart(sample.start)) {
     return CannotReadMesh(path,
                           "it is neither text that begins with \"solid\" nor a binary STL file of "
-                          "the length that its header says; it is truncated or no STL file");
+                          "the length in its header; it is truncated or not an STL file");
   }
   const std::optional<MeshFormat> found = FormatOfStart(sample.start);
   const absl::string_view is =
       found ? LookOf(*found).what : (wanted.first_word == "<" ? "not XML" : "of unknown format");
   return CannotReadMesh(path, absl::StrCat("it is ", is, ", but its ending promises ", wanted.what,
-                                           "; name it as what it is"));
+                                           "; rename the file"));
 }
 
 absl::StatusOr<Sample> TakeSample(const std::string& path, int64_t bytes) {

@@ -59,9 +59,9 @@ std::string EndingsOf(MeshKind kind) {
 }
 
 absl::Status UnknownEnding(const std::string& path) {
-  return CannotReadMesh(
-      path, absl::StrCat("its ending is none of those that are read: ", EndingsOf(MeshKind::kTets),
-                         " (tets), ", EndingsOf(MeshKind::kTriangles), " (surfaces)"));
+  return CannotReadMesh(path, absl::StrCat("its ending is not one of the supported ones: ",
+                                           EndingsOf(MeshKind::kTets), " (tets), ",
+                                           EndingsOf(MeshKind::kTriangles), " (surfaces)"));
 }
 
 absl::Status WrongKind(const std::string& path, MeshKind wanted) {
@@ -125,8 +125,9 @@ absl::Status CannotReadMesh(const std::string& path, absl::string_view why) {
 absl::StatusOr<MeshFormat> SurfaceFormatOfPath(const std::string& path) {
   const Ending* const ending = FindEnding(path);
   if (ending != nullptr && ending->kind == MeshKind::kTriangles) return ending->format;
-  return absl::InvalidArgumentError(absl::StrCat(
-      "cannot write surface ", path, ": its ending is none of ", EndingsOf(MeshKind::kTriangles)));
+  return absl::InvalidArgumentError(absl::StrCat("cannot write surface ", path,
+                                                 ": its ending is not one of ",
+                                                 EndingsOf(MeshKind::kTriangles)));
 }
 
 std::string TetgenPartner(const std::string& path) {

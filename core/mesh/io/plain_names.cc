@@ -20,8 +20,8 @@ absl::StatusOr<PlainNames> PlainNames::Create() {
   const std::filesystem::path place = std::filesystem::temp_directory_path(error);
   std::string folder = (place / "tissueform-XXXXXX").string();
   if (error || mkdtemp(folder.data()) == nullptr) {
-    return absl::ErrnoToStatus(
-        errno, absl::StrCat("cannot make a temporary folder in ", place.string(), "; set TMPDIR"));
+    return absl::ErrnoToStatus(errno, absl::StrCat("cannot create a temporary folder in ",
+                                                   place.string(), "; set TMPDIR"));
   }
   return PlainNames(std::move(folder));
 }

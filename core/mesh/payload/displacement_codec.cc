@@ -42,7 +42,7 @@ Columns Quantise(const FloatPositions& displacements, double step) {
 
 absl::Status Damaged(absl::string_view what) {
   return absl::DataLossError(
-      absl::StrCat("packed displacements ", what, "; ask for float32 if this happens again"));
+      absl::StrCat("packed displacements ", what, "; request float32 if this happens again"));
 }
 
 absl::Status CheckSize(absl::string_view bytes, size_t expected) {

@@ -33,10 +33,10 @@ absl::Status ReadGrid(const CheckedMeshFile& file, TetGridReader* reader) {
   if (!reader->defect().empty()) return absl::InvalidArgumentError(reader->defect());
   if (!errors.first_error().empty()) {
     return absl::InvalidArgumentError(
-        absl::StrCat("it is damaged or no .vtu file (", errors.first_error(), ")"));
+        absl::StrCat("it is damaged or not a .vtu file (", errors.first_error(), ")"));
   }
   if (reader->GetErrorCode() != 0)
-    return absl::InvalidArgumentError("it is damaged or no .vtu file");
+    return absl::InvalidArgumentError("it is damaged or not a .vtu file");
   return absl::OkStatus();
 }
 

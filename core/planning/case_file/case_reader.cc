@@ -48,8 +48,7 @@ absl::StatusOr<CaseMesh> ParseMesh(const Glb& glb, const Json& json) {
                                                     " bytes; its counts say ", shape.TotalBytes()));
   }
   if (absl::StrCat(kMeshNamePrefix, Sha256Hex({shape.Text(), payload})) != mesh.name) {
-    return absl::DataLossError(
-        "the mesh in the case is not the one that its name says; get the case again");
+    return absl::DataLossError("the case's mesh does not match its digest; get the case again");
   }
   mesh.payload = std::string(payload);
   return mesh;
@@ -106,14 +105,14 @@ absl::Status CheckNames(const CaseFile& contents) {
   std::vector<std::string> handles;
   for (const CaseHandle& handle : contents.handles) {
     if (std::find(handles.begin(), handles.end(), handle.name) != handles.end()) {
-      return BrokenCase("/handles", "has a name twice");
+      return BrokenCase("/handles", "has a duplicate name");
     }
     handles.push_back(handle.name);
   }
   std::set<int> regions = {0};
   for (const CaseSkinRegion& region : contents.skin_regions) {
     if (!regions.insert(region.number).second) {
-      return BrokenCase("/skin_regions", "has a number twice");
+      return BrokenCase("/skin_regions", "has a duplicate number");
     }
   }
   for (size_t s = 0; s < contents.surfaces.size(); ++s) {
@@ -121,7 +120,7 @@ absl::Status CheckNames(const CaseFile& contents) {
     const std::string where = absl::StrCat("/surfaces/", s);
     const bool has_stray = std::any_of(surface.regions.begin(), surface.regions.end(),
                                        [&](uint8_t r) { return regions.count(r) == 0; });
-    if (has_stray) return BrokenCase(where + "/regions", "has a number of no skin region");
+    if (has_stray) return BrokenCase(where + "/regions", "has a number that is not a skin region");
   }
   return CheckReferences(contents.surfaces, contents.landmarks, handles);
 }

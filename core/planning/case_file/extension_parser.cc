@@ -26,7 +26,7 @@ absl::Status CheckIsOneLine(const Json& json, const std::string& where) {
     const bool has_control = std::any_of(text.begin(), text.end(), [](char c) {
       return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
     });
-    if (has_control) return BrokenCase(where, "holds a control character");
+    if (has_control) return BrokenCase(where, "contains a control character");
   }
   if (!json.is_structured()) return absl::OkStatus();
   for (const auto& [key, value] : json.items()) {
@@ -111,10 +111,10 @@ absl::Status CheckReferences(const std::vector<CaseSurface>& surfaces,
     const std::string where = absl::StrCat("/surfaces/", s);
     const CaseSurface& surface = surfaces[s];
     if (!is_known(surface.handle)) {
-      return BrokenCase(where + "/handle", "names a handle that there is not");
+      return BrokenCase(where + "/handle", "names a handle that does not exist");
     }
     if (surface.kind == SurfaceKind::kSegment && surface.handle.empty()) {
-      return BrokenCase(where, "is a segment and has no handle");
+      return BrokenCase(where, "is a segment without a handle");
     }
     if (surface.kind == SurfaceKind::kSkin && skin_vertices == 0) {
       skin_vertices = surface.positions.rows();
@@ -123,11 +123,11 @@ absl::Status CheckReferences(const std::vector<CaseSurface>& surfaces,
   for (size_t l = 0; l < landmarks.size(); ++l) {
     const std::string where = absl::StrCat("/landmarks/", l);
     if (!is_known(landmarks[l].handle)) {
-      return BrokenCase(where + "/handle", "names a handle that there is not");
+      return BrokenCase(where + "/handle", "names a handle that does not exist");
     }
     if (landmarks[l].skin_vertex && *landmarks[l].skin_vertex >= skin_vertices) {
       return BrokenCase(where + "/skin_vertex",
-                        absl::StrCat("is none of the skin's ", skin_vertices, " vertices"));
+                        absl::StrCat("is not one of the skin's ", skin_vertices, " vertices"));
     }
   }
   return absl::OkStatus();

@@ -48,9 +48,9 @@ void Pad(std::string* text, size_t multiple, char with) {
 
 // Takes the chunk at the front of `bytes` off it.
 absl::StatusOr<absl::string_view> TakeChunk(absl::string_view* bytes, uint32_t type) {
-  if (bytes->size() < kChunkHeadBytes) return Refused("a chunk is missing; it is cut off");
+  if (bytes->size() < kChunkHeadBytes) return Refused("a chunk is missing; it is truncated");
   const size_t size = Word(*bytes, 0);
-  if (Word(*bytes, 4) != type) return Refused("its chunks are not JSON and then BIN");
+  if (Word(*bytes, 4) != type) return Refused("its chunks are not JSON followed by BIN");
   if (size % 4 != 0 || size > bytes->size() - kChunkHeadBytes) {
     return Refused(absl::StrCat("a chunk says ", size, " bytes and ",
                                 bytes->size() - kChunkHeadBytes, " follow"));
@@ -63,7 +63,7 @@ absl::StatusOr<absl::string_view> TakeChunk(absl::string_view* bytes, uint32_t t
 absl::Status CutIntoViews(absl::string_view bin, Glb* glb) {
   TF_ASSIGN_OR_RETURN(const std::vector<Json> buffers, Objects(glb->root, "buffers", 1, ""));
   if (buffers.size() != 1 || buffers[0].contains("uri")) {
-    return Refused("it has not exactly one buffer, inside the file");
+    return Refused("it must have exactly one buffer, inside the file");
   }
   const int64_t chunk_bytes = static_cast<int64_t>(bin.size());
   TF_ASSIGN_OR_RETURN(const int64_t buffer_bytes,
@@ -81,7 +81,7 @@ absl::Status CutIntoViews(absl::string_view bin, Glb* glb) {
     TF_ASSIGN_OR_RETURN(const int64_t size,
                         WholeNumber(views[v], "byteLength", 1, buffer_bytes - offset, where));
     if (offset % int64_t{kGlbAlignment} != 0 || views[v].contains("byteStride")) {
-      return Refused(absl::StrCat(where, " does not begin at a multiple of ", kGlbAlignment,
+      return Refused(absl::StrCat(where, " does not start at a multiple of ", kGlbAlignment,
                                   ", or has a stride"));
     }
     glb->views.push_back(bin.substr(static_cast<size_t>(offset), static_cast<size_t>(size)));
@@ -128,9 +128,9 @@ std::string GlbWriter::Finish(Json root) const {
 
 absl::StatusOr<Glb> ParseGlb(absl::string_view bytes, size_t most_json) {
   if (bytes.size() < kHeadBytes || Word(bytes, 0) != kMagic) {
-    return Refused("it does not begin with \"glTF\"");
+    return Refused("it does not start with \"glTF\"");
   }
-  if (Word(bytes, 4) != 2) return Refused("only version 2 is read");
+  if (Word(bytes, 4) != 2) return Refused("only version 2 is supported");
   if (Word(bytes, 8) != bytes.size()) {
     return Refused(absl::StrCat("it says ", Word(bytes, 8), " bytes and has ", bytes.size()));
   }
@@ -141,10 +141,10 @@ absl::StatusOr<Glb> ParseGlb(absl::string_view bytes, size_t most_json) {
         absl::StrCat("the JSON has ", json.size(), " bytes; at most ", most_json, " are read"));
   }
   TF_ASSIGN_OR_RETURN(const absl::string_view bin, TakeChunk(&bytes, kBinChunk));
-  if (!bytes.empty()) return Refused("something follows its BIN chunk");
+  if (!bytes.empty()) return Refused("there is data after its BIN chunk");
   Glb glb;
   TF_ASSIGN_OR_RETURN(glb.root, ParseJsonStrictly(std::string(json)));
-  if (!glb.root.is_object()) return Refused("its JSON is no object");
+  if (!glb.root.is_object()) return Refused("its JSON is not an object");
   TF_RETURN_IF_ERROR(CutIntoViews(bin, &glb));
   return glb;
 }
@@ -159,7 +159,8 @@ absl::StatusOr<int64_t> WholeNumber(const Json& object, const char* key, int64_t
   if (is_whole && found->get<int64_t>() >= least && found->get<int64_t>() <= most) {
     return found->get<int64_t>();
   }
-  return Refused(absl::StrCat(where, "/", key, " is no whole number from ", least, " to ", most));
+  return Refused(
+      absl::StrCat(where, "/", key, " is not a whole number from ", least, " to ", most));
 }
 
 absl::StatusOr<std::vector<Json>> Objects(const Json& object, const char* key, size_t most,
@@ -167,10 +168,11 @@ absl::StatusOr<std::vector<Json>> Objects(const Json& object, const char* key, s
   const auto found = object.find(key);
   if (found == object.end()) return std::vector<Json>{};
   if (!found->is_array() || found->size() > most) {
-    return Refused(absl::StrCat(where, "/", key, " is no list of at most ", most));
+    return Refused(absl::StrCat(where, "/", key, " is not a list of at most ", most));
   }
   for (const Json& item : *found) {
-    if (!item.is_object()) return Refused(absl::StrCat(where, "/", key, " holds no object"));
+    if (!item.is_object())
+      return Refused(absl::StrCat(where, "/", key, " does not contain an object"));
   }
   return found->get<std::vector<Json>>();
 }

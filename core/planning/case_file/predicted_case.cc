@@ -19,19 +19,19 @@ using PosesByName = std::map<std::string, HandlePose>;
 absl::StatusOr<HandlePose> PoseOf(const PosesByName& poses, const std::string& handle) {
   const auto found = poses.find(handle);
   if (found != poses.end()) return found->second;
-  return absl::InvalidArgumentError(
-      absl::StrCat("the prediction has no pose of the handle \"", handle,
-                   "\" of the case; name the case that it was planned in"));
+  return absl::InvalidArgumentError(absl::StrCat("the prediction has no pose for the handle \"",
+                                                 handle,
+                                                 "\" of the case; use the prediction's own case"));
 }
 
 absl::Status CheckDeformed(const CaseMesh& mesh, const Positions& deformed) {
   if (deformed.rows() != mesh.vertex_count) {
     return absl::InvalidArgumentError(absl::StrCat(
         "there are positions of ", deformed.rows(), " vertices, and the mesh of the case has ",
-        mesh.vertex_count, "; name the case that the prediction was planned in"));
+        mesh.vertex_count, "; use the case in which the prediction was planned"));
   }
   if (!deformed.allFinite()) {
-    return absl::InvalidArgumentError("a position of the prediction is no number");
+    return absl::InvalidArgumentError("a position of the prediction is not a number");
   }
   return absl::OkStatus();
 }
@@ -89,7 +89,7 @@ absl::StatusOr<PredictedCase> PredictCase(const CaseFile& contents, const Positi
     TF_ASSIGN_OR_RETURN(FloatPositions moved, PredictSurface(surface, displacements, poses));
     if (!moved.allFinite()) {
       return absl::InvalidArgumentError(absl::StrCat("the prediction moves the surface \"",
-                                                     surface.name, "\" beyond all bounds"));
+                                                     surface.name, "\" too far to be valid"));
     }
     predicted.surfaces.push_back(std::move(moved));
   }

@@ -71,14 +71,14 @@ absl::StatusOr<Numbers> ParseAccessor(const Glb& glb, const Json& holder, const 
 
 absl::StatusOr<Json> OnlyPrimitive(const Glb& glb, size_t mesh, const std::string& where) {
   TF_ASSIGN_OR_RETURN(const std::vector<Json> meshes, Objects(glb.root, "meshes", 64, ""));
-  if (mesh >= meshes.size()) return BrokenCase(where + "/mesh", "names a mesh that there is not");
+  if (mesh >= meshes.size()) return BrokenCase(where + "/mesh", "names a mesh that does not exist");
   const std::string at = absl::StrCat("/meshes/", mesh);
   TF_ASSIGN_OR_RETURN(const std::vector<Json> primitives,
                       Objects(meshes[mesh], "primitives", 1, at));
   if (primitives.size() != 1 || !primitives[0].contains("attributes") ||
       !primitives[0]["attributes"].is_object() ||
       primitives[0].value("mode", Json(kTriangles)) != kTriangles) {
-    return BrokenCase(at, "has not exactly one primitive, of triangles");
+    return BrokenCase(at, "must have exactly one primitive, of triangles");
   }
   return primitives[0];
 }
@@ -97,13 +97,13 @@ absl::Status ParseTriangles(const Glb& glb, size_t mesh, const std::string& wher
                                                      " triangles; at most ", kMaxSurfaceTriangles,
                                                      " are read"));
   }
-  if (indices.count % 3 != 0) return BrokenCase(at, "has indices that are no triangles");
+  if (indices.count % 3 != 0) return BrokenCase(at, "has indices that do not form triangles");
   TF_RETURN_IF_ERROR(FillRows(positions.bytes, positions.count, at, &surface->positions));
   // Numbers of 2^31 and more become negative ones, which are refused as well.
   TF_RETURN_IF_ERROR(FillRows(indices.bytes, indices.count / 3, at, &surface->triangles));
-  if (!surface->positions.allFinite()) return BrokenCase(where, "holds NaN or infinity");
+  if (!surface->positions.allFinite()) return BrokenCase(where, "contains NaN or infinity");
   if (surface->triangles.minCoeff() < 0 || surface->triangles.maxCoeff() >= positions.count) {
-    return BrokenCase(where, absl::StrCat("names a vertex that is none of its ", positions.count));
+    return BrokenCase(where, absl::StrCat("names a vertex outside its ", positions.count));
   }
   return absl::OkStatus();
 }
@@ -118,11 +118,11 @@ absl::Status ParseFollows(const Glb& glb, const Json& json, int64_t mesh_vertice
   TF_RETURN_IF_ERROR(FillRows(weights, rows, where + "/weights", &follows.weights));
   if (follows.vertices.minCoeff() < 0 || follows.vertices.maxCoeff() >= mesh_vertices) {
     return BrokenCase(where + "/vertices",
-                      absl::StrCat("names a vertex that is none of the mesh's ", mesh_vertices));
+                      absl::StrCat("names a vertex outside the mesh's ", mesh_vertices));
   }
   if (!follows.weights.allFinite() || follows.weights.minCoeff() < 0 ||
       follows.weights.rowwise().sum().maxCoeff() > 1 + kWeightTolerance) {
-    return BrokenCase(where + "/weights", "has weights below 0 or over 1 together");
+    return BrokenCase(where + "/weights", "has weights below 0, or with a sum above 1");
   }
   surface->follows = std::move(follows);
   return absl::OkStatus();
@@ -150,7 +150,7 @@ absl::StatusOr<absl::string_view> ViewOf(const Glb& glb, const Json& json, const
                                          const std::string& where) {
   const size_t number = json.at(key).get<size_t>();
   if (number < glb.views.size()) return glb.views[number];
-  return BrokenCase(absl::StrCat(where, "/", key), "names a buffer view that there is not");
+  return BrokenCase(absl::StrCat(where, "/", key), "names a buffer view that does not exist");
 }
 
 absl::StatusOr<CaseSurface> ParseSurface(const Glb& glb, const Json& json, int64_t mesh_vertices,
@@ -167,7 +167,7 @@ absl::StatusOr<CaseSurface> ParseSurface(const Glb& glb, const Json& json, int64
   if (json.contains("regions")) {
     TF_ASSIGN_OR_RETURN(const absl::string_view regions, ViewOf(glb, json, "regions", where));
     if (static_cast<Index>(regions.size()) != surface.positions.rows()) {
-      return BrokenCase(where + "/regions", "has not one byte a vertex");
+      return BrokenCase(where + "/regions", "must have one byte per vertex");
     }
     surface.regions.assign(regions.begin(), regions.end());
   }

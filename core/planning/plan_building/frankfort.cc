@@ -237,8 +237,9 @@ absl::StatusOr<HeadFrame> ChooseHeadFrame(const HeadFrameSources& sources) {
   if (std::abs(midsagittal.normal.dot(horizontal.normal)) > 0.5 || midsagittal.normal.x() < 0.5 ||
       horizontal.normal.z() < 0.5) {
     return absl::InvalidArgumentError(
-        "the planes at /head_frame are no head's: the normal of midsagittal points to the left "
-        "(+x) and that of horizontal up (+z), about at right angles");
+        "the planes at /head_frame do not fit a head: the normal of midsagittal must point to the "
+        "left "
+        "(+x) and that of horizontal up (+z), approximately at right angles");
   }
   HeadFrame frame = FrameOfPlanes(midsagittal, horizontal);
   const bool is_given = sources.given_midsagittal || sources.given_horizontal;

@@ -55,7 +55,7 @@ absl::Status WaitFor(int answer, int cancel) {
     if (errno != EINTR) return absl::ErrnoToStatus(errno, "cannot wait for the plan");
   }
   // First: Ctrl-C shall end the work also while it sends one stage after the other.
-  if (watched[1].revents != 0) return absl::CancelledError("the work was ended");
+  if (watched[1].revents != 0) return absl::CancelledError("the work was stopped");
   return absl::OkStatus();
 }
 
@@ -82,11 +82,11 @@ absl::StatusOr<PlanBuildAnswer> ReceiveAnswer(int answer, const PlanBuildCallOpt
 absl::Status Explain(const ChildEnd& end) {
   if (end.signal == SIGKILL || end.signal == SIGXCPU) {
     return absl::ResourceExhaustedError(
-        "the work was killed, perhaps for want of memory; nothing was written");
+        "the work was killed, possibly because memory ran out; no files were written");
   }
   return absl::InternalError(end.signal != 0 ? absl::StrCat("a library crashed (signal ",
-                                                            end.signal, "); nothing was written")
-                                             : "a library ended the work; nothing was written");
+                                                            end.signal, "); no files were written")
+                                             : "a library ended the work; no files were written");
 }
 
 }  // namespace

@@ -89,7 +89,7 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
                                             int threads, Progress* progress) {
   progress->Begin("reading the CT", 0, 0.08);
   TF_ASSIGN_OR_RETURN(CtVolume volume, ReadCtVolume(ct_path, recipe.ct));
-  progress->Begin("lessening the streaks of metal, resampling", 0.08, 0.12);
+  progress->Begin("reducing metal artifacts, resampling", 0.08, 0.12);
   ResampledCt result{.provenance = std::move(volume.provenance),
                      .size = volume.size,
                      .spacing_mm = volume.spacing_mm,
@@ -103,10 +103,10 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
 
 absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
                                     const Recipe& recipe, Progress* progress) {
-  progress->Begin("finding the head and its bone", 0.12, 0.3);
+  progress->Begin("finding head and bone", 0.12, 0.3);
   TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct.hu, recipe.segmentation,
                                                          progress->Parts(), ct.metal, unscanned));
-  progress->Begin("telling the bones apart", 0.3, 0.42);
+  progress->Begin("separating bones", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
   const bool plane_given = recipe.occlusal_plane.has_value();
@@ -137,10 +137,10 @@ absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label
 
 absl::Status CheckMove(const std::string& segment, double largest_move_mm) {
   if (largest_move_mm <= kMaxMoveMm) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrFormat("the \"pose\" of segment \"%s\" moves some of its bone by %.1f mm; a plan "
-                      "moves bone by at most %g mm (is the pivot where the bone is, in mm, LPS?)",
-                      segment, largest_move_mm, kMaxMoveMm));
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "the \"pose\" of segment \"%s\" moves some of its bone by %.1f mm; the limit is "
+      "%g mm (is the pivot near the bone, in mm, LPS?)",
+      segment, largest_move_mm, kMaxMoveMm));
 }
 
 absl::StatusOr<BuiltSegment> BuildSegment(const LabelGrid& bone, uint8_t label,
@@ -236,7 +236,7 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
                                      const Anatomy& anatomy,
                                      const std::vector<BuiltSegment>& segments,
                                      const Recipe& recipe, int threads, Progress* progress) {
-  progress->Begin("stiffness and regions", 0.9, 0.96);
+  progress->Begin("assigning stiffness and regions", 0.9, 0.96);
   const HeadSegmentation& head = anatomy.head;
   TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
                                                                   {.table = recipe.tissues}));
@@ -281,13 +281,13 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                       Mesh(soft_tissue, anatomy.landmarks, recipe, options.threads, &progress));
   TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
                                                         recipe, options.threads, &progress));
-  progress.Begin("comparing with the CT's skin", 0.96, 0.98);
+  progress.Begin("comparing the mesh with the CT's skin", 0.96, 0.98);
   TF_ASSIGN_OR_RETURN(SkinCoverage coverage,
                       MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
                                           {mesh.surface, description.released.regions,
                                            soft_tissue.region, &soft_tissue.outside_air},
                                           ct.spacing_mm.maxCoeff(), options.threads));
-  progress.Begin("surfaces for a viewer", 0.98, 1);
+  progress.Begin("extracting surfaces for the viewer", 0.98, 1);
   TF_ASSIGN_OR_RETURN(std::vector<CaseSurface> viewer_surfaces,
                       MakeViewerSurfaces({.head = anatomy.head,
                                           .outside_air = soft_tissue.outside_air,

@@ -114,7 +114,7 @@ absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& 
   std::filesystem::create_directory(folder, error);
   if (error) {
     return absl::FailedPreconditionError(
-        absl::StrCat("cannot make the folder ", folder.string(), ": ", error.message()));
+        absl::StrCat("cannot create the folder ", folder.string(), ": ", error.message()));
   }
   for (const BuiltSegment& segment : build.segments) {
     TF_RETURN_IF_ERROR(

@@ -147,11 +147,11 @@ absl::Status CheckPresent(const std::vector<uint8_t>& anatomy,
   for (size_t label = kFixed; label < kFirstSegment + segments.size(); ++label) {
     if (std::find(anatomy.begin(), anatomy.end(), label) != anatomy.end()) continue;
     const std::string what =
-        label == kFixed ? "the bone that stays and the cuts have"
+        label == kFixed ? "the fixed bone and the cuts have"
                         : absl::StrCat("segment ", segments[label - kFirstSegment], " has");
     return absl::InvalidArgumentError(
-        absl::StrCat(what, " no vertex of the mesh left with a contact band of ", contact_band_mm,
-                     " mm; give a smaller \"contact_band_mm\" or a finer mesh"));
+        absl::StrCat(what, " no vertices left with a contact band of ", contact_band_mm,
+                     " mm; use a smaller \"contact_band_mm\" or a finer mesh"));
   }
   return absl::OkStatus();
 }

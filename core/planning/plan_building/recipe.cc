@@ -230,15 +230,15 @@ Json TissueToJson(const TissueClass& tissue) {
 absl::StatusOr<Recipe> ReadRecipe(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
-    return absl::NotFoundError(absl::StrCat("recipe ", path, " does not exist or is no file"));
+    return absl::NotFoundError(absl::StrCat("recipe ", path, " does not exist or is not a file"));
   }
   std::ifstream stream(path, std::ios::binary);
   std::string text(kMaxRecipeBytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<size_t>(stream.gcount()));
   if (text.size() > kMaxRecipeBytes) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("recipe ", path, " has more than ", kMaxRecipeBytes, " bytes; that is none"));
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "recipe ", path, " has more than ", kMaxRecipeBytes, " bytes, the limit for a recipe"));
   }
   if (!stream.eof()) {
     return absl::PermissionDeniedError(

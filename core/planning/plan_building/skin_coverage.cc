@@ -124,7 +124,7 @@ absl::StatusOr<OuterSkin> FindOuterSkin(const HeadSegmentation& head, const Labe
     return outer;
   }
   return absl::InvalidArgumentError(
-      "no outer skin lies within the region of interest, or none that the CT's border does not "
+      "the region of interest has no outer skin, or only skin that the CT's border does not "
       "cut; "
       "move its planes");
 }
@@ -140,7 +140,7 @@ absl::StatusOr<TriangleMesh> SkinOf(const MeshedSkin& mesh) {
     return KeepTriangles(mesh.surface, kept);
   }
   return absl::InvalidArgumentError(
-      "no part of the mesh's boundary is skin; move the planes of "
+      "the mesh's boundary has no skin; move the planes of "
       "the region of interest");
 }
 

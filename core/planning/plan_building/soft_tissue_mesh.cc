@@ -111,7 +111,7 @@ absl::StatusOr<SoftTissueMesh> Attempt(const TriangleMesh& isosurface,
                       Tetrahedralize(remeshed.mesh, Filling(options, remeshing.edge_mm)));
   const TetMesh& mesh = filled.mesh;
   if (FindConnectedComponents(mesh.tets(), mesh.num_vertices()).count != 1) {
-    return absl::InvalidArgumentError("the mesh falls apart; ask for shorter edges");
+    return absl::InvalidArgumentError("the mesh is not connected; request shorter edges");
   }
   SoftTissueMeshReport report;
   report.edge_mm = remeshing.edge_mm;

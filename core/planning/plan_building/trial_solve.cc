@@ -63,7 +63,8 @@ absl::StatusOr<ConstraintSet> Constraints(const TrialSolve& trial,
   if (std::any_of(vertices.begin() + kFixedBone, vertices.end(),
                   [](const auto& held) { return held.size() < kLeastHeld; })) {
     return absl::InvalidArgumentError(
-        "the planned moves tear the tissue wherever the bones are held; plan smaller moves or give "
+        "the planned movements invert tets wherever bone is attached; plan smaller movements or "
+        "use "
         "a wider \"contact_band_mm\"");
   }
   std::vector<HandleRegion> handles;

@@ -155,7 +155,7 @@ absl::Status AddSkin(const ViewerSources& sources, std::vector<CaseSurface>* sur
   const auto split = Split(skin, 2, [&](const Vector3d& middle) -> size_t {
     return IsAtEnd(middle, sources.head.hu.geometry) ? 1 : 0;
   });
-  if (!split[0]) return absl::InvalidArgumentError("the CT shows no skin of the head");
+  if (!split[0]) return absl::InvalidArgumentError("the CT does not show the head's skin");
   surfaces->push_back(ToCaseSurface("skin", SurfaceKind::kSkin, "", *split[0]));
   if (split[1]) {
     surfaces->push_back(ToCaseSurface("end of the CT", SurfaceKind::kSkin, "", *split[1]));

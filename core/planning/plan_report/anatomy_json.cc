@@ -29,13 +29,13 @@ Json PlanesJson(const std::vector<Plane>& planes) {
 const char* SeparationText(JawSeparation separation) {
   switch (separation) {
     case JawSeparation::kThreshold:
-      return "the teeth do not touch: at marker_hu the lower jaw is a piece of its own";
+      return "the teeth do not touch: at marker_hu the mandible is a separate component";
     case JawSeparation::kAutomaticCut:
-      return "the teeth touch: cut apart by the plane between them with the best clearance";
+      return "the teeth touch: separated by the plane between them with the best clearance";
     case JawSeparation::kGivenCut:
       break;
   }
-  return "cut apart by the recipe's occlusal_plane";
+  return "separated by the recipe's occlusal_plane";
 }
 
 }  // namespace
@@ -47,11 +47,11 @@ Json HeadJson(const PlanBuild& build) {
           {"origin_mm", ToJson(grid.origin_mm)},
           {"volume_mm3", static_cast<double>(CountVoxels(build.head.head)) * VoxelVolumeMm3(grid)},
           {"removed_mm3", build.head.removed_mm3},
-          {"removed_means", "tissue that was taken away: tubes, cords, head rest"},
+          {"removed_means", "removed objects: tubes, cords, head rest"},
           {"removed_objects", ObjectsJson(build)},
           {"bare_fraction", build.head.bare_fraction},
           {"bare_means",
-           "share of the outer surface nearer than 2.5 mm to bone; a living head has 0 to 0.1"}};
+           "share of the outer surface within 2.5 mm of bone; a living head has 0 to 0.1"}};
 }
 
 Json BoneJson(const PlanBuild& build, const PlanMeasures& measures) {
@@ -66,10 +66,11 @@ Json BoneJson(const PlanBuild& build, const PlanMeasures& measures) {
   }
   bone["confidence"] = build.parts.confidence;
   bone["confidence_means"] =
-      "share of the lower jaw's surface that the CT itself shows, bone beside no bone; where the "
-      "rest touches the cranium the watershed or the plane decided, and what lies within 3 mm of "
+      "share of the mandible's surface that is visible in the CT, bone next to other material; "
+      "where the "
+      "rest touches the cranium the watershed or the plane decides, and the surface within 3 mm of "
       "metal "
-      "is not seen";
+      "is not visible";
   return bone;
 }
 
@@ -160,10 +161,10 @@ Json SoftTissueJson(const SoftTissue& soft_tissue) {
   return {{"volume_mm3", soft_tissue.volume_mm3},
           {"left_out_mm3", soft_tissue.left_out_mm3},
           {"left_out_means",
-           "soft voxels in the region's box that are not modelled: brain, marrow, thin sheets"},
+           "soft voxels in the region's box that are not modeled: brain, marrow, thin sheets"},
           {"filled_mm3", soft_tissue.filled_mm3},
           {"filled_means",
-           "modelled though it is no soft voxel: air or bone behind thin skin, small cavities"}};
+           "modeled although not a soft voxel: air or bone behind thin skin, small cavities"}};
 }
 
 }  // namespace tissueform

@@ -34,15 +34,16 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
   const double nose_mm = build.landmarks.nose_prominence_mm;
   if (NoseIsCut(build.coverage)) {
     cautions.push_back(
-        "The CT does not hold the whole nose: how far it stands out is not judged. There may be no "
-        "tip to predict, and what is called nose may lie near the upper lip and move more than a "
+        "The CT does not contain the whole nose, so its projection is not checked. The model may "
+        "have no "
+        "nose tip, and the region \"nose\" may be near the upper lip and move more than a "
         "tip "
         "does.");
   } else if (nose_mm < kFlatNoseMm) {
     cautions.push_back(absl::StrFormat(
-        "The nose is cut off or pressed flat in this CT: its foremost skin stands %.1f mm before "
-        "the skin under it. There is no tip to predict, and what is called nose lies near "
-        "the upper lip and moves more than a tip does.",
+        "The nose is truncated or flattened in this CT: its foremost skin is %.1f mm in front of "
+        "the skin under it. The model has no nose tip, and the region \"nose\" is near "
+        "the upper lip and moves more than a tip would.",
         nose_mm));
   }
   const GridGeometry& grid = build.head.hu.geometry;
@@ -51,26 +52,29 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
   if (build.parts.cut_off_mm) {
     cautions.push_back(absl::StrFormat(
         "The CT's lower border cuts the chin: about %.1f mm of its bone and the skin under it are "
-        "missing. The neck, which holds the skin there, is missing, too; the chin may move too "
+        "missing. The neck, which restrains the skin there, is missing, too; the predicted "
+        "movement of the chin may be too "
         "much, "
-        "and its lower rim says little.",
+        "and its lower border is unreliable.",
         *build.parts.cut_off_mm));
   } else if (under_chin_mm < kLittleUnderChinMm) {
-    cautions.push_back(
-        absl::StrFormat("The CT ends %.0f mm under the bone of the chin: the neck, which holds the "
-                        "skin there, is missing, and the skin under the chin may move too much.",
-                        under_chin_mm));
+    cautions.push_back(absl::StrFormat(
+        "The CT ends %.0f mm below the bony chin: the neck, which restrains the "
+        "skin there, is missing, and the predicted movement under the chin may be too large.",
+        under_chin_mm));
   }
   if (build.num_inverted > 0) {
-    cautions.push_back(absl::StrFormat(
-        "%d tets turn inside out at the planned move, or a third beyond it, in some model, and no "
-        "bone near by could be let go: plan a smaller move, or give a wider \"contact_band_mm\".",
-        build.num_inverted));
+    cautions.push_back(
+        absl::StrFormat("%d tets are inverted at the planned movement, or a third beyond it, in at "
+                        "least one model, and no "
+                        "nearby bone contact could be released: plan a smaller movement, or use a "
+                        "wider \"contact_band_mm\".",
+                        build.num_inverted));
   }
   if (build.parts.separation == JawSeparation::kAutomaticCut) {
     cautions.push_back(
-        "Upper and lower teeth touch in this CT and were cut apart by a plane that was found: look "
-        "at the bone's picture, and give \"occlusal_plane\" in the recipe if it cuts teeth.");
+        "Upper and lower teeth touch in this CT and were separated by an automatic plane: check "
+        "the picture of the bone, and set \"occlusal_plane\" in the recipe if it cuts teeth.");
   }
   return cautions;
 }

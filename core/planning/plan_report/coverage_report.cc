@@ -50,7 +50,7 @@ std::string Words(SkinRegion region) {
     case SkinRegion::kNone:
       break;
   }
-  return "the skin without a name";
+  return "the unnamed skin";
 }
 
 std::string KeyOf(SkinRegion region) {
@@ -83,14 +83,14 @@ QualityCheck CheckParts(const std::string& name, const std::string& required,
 std::string LooseText(double hu_behind) {
   if (hu_behind >= kLooserThanSkinHu) return "";
   return absl::StrFormat(
-      " The densest that the CT shows up to 3 mm behind it has %.0f HU on average, less than fat: "
+      " The densest material up to 3 mm behind it has %.0f HU on average, less than fat: "
       "hair or cloth rather than skin.",
       hu_behind);
 }
 
 std::string GapText(const SkinGap& gap, double limit_mm) {
   const std::string text = absl::StrFormat(
-      "Skin of the CT is missing in the mesh: %.1f cm2 of %s are farther than %.1f mm from it, up "
+      "Skin of the CT is missing in the mesh: %.1f cm2 of %s are more than %.1f mm from it, up "
       "to %.1f mm at %s.",
       gap.area_mm2 / 100, Words(gap.region), limit_mm, gap.largest_mm, PlaceText(gap.farthest));
   return absl::StrCat(text, LooseText(gap.hu_behind));
@@ -154,7 +154,7 @@ std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage) {
   const size_t worst = WorstRegion(coverage);
   const double worst_share = coverage.regions[worst].share();
   const std::string within =
-      absl::StrFormat("Skin of the CT within %.1f mm of the mesh's", coverage.tolerance_mm);
+      absl::StrFormat("CT skin within %.1f mm of the mesh's", coverage.tolerance_mm);
   return {
       {absl::StrCat(within, ", as a whole"), absl::StrFormat("at least %g %%", 100 * kLeastCovered),
        absl::StrFormat("%.2f %%", 100 * coverage.whole.share()),
@@ -163,10 +163,10 @@ std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage) {
        absl::StrFormat("at least %g %%", 100 * kLeastCovered),
        absl::StrFormat("%.2f %% in %s", 100 * worst_share, Words(static_cast<SkinRegion>(worst))),
        worst_share >= kLeastCovered},
-      CheckParts(absl::StrFormat("Gaps: skin of the CT farther than %g mm", kGapMm),
+      CheckParts(absl::StrFormat("Gaps: CT skin farther than %g mm", kGapMm),
                  absl::StrFormat("none over %.1f cm2", kLargestGapMm2 / 100), coverage.gaps,
                  kLargestGapMm2),
-      CheckParts(absl::StrFormat("Holes: skin of the CT farther than %.1f mm", coverage.hole_mm),
+      CheckParts(absl::StrFormat("Holes: CT skin farther than %.1f mm", coverage.hole_mm),
                  absl::StrFormat("none over %.1f cm2", kLargestHoleMm2 / 100), coverage.holes,
                  kLargestHoleMm2)};
 }
@@ -177,7 +177,7 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
     const CoveredPart& part = coverage.regions[r];
     if (part.share() >= kLeastCovered) continue;
     const std::string text = absl::StrFormat(
-        "The mesh lacks %.1f %% of %s: %.1f of %.1f cm2 of the CT's skin are farther than %.1f mm "
+        "The mesh misses %.1f %% of %s: %.1f of %.1f cm2 of the CT's skin are more than %.1f mm "
         "from the mesh's, up to %.1f mm at %s.",
         100 * (1 - part.share()), Words(static_cast<SkinRegion>(r)),
         (part.area_mm2 - part.covered_mm2) / 100, part.area_mm2 / 100, coverage.tolerance_mm,
@@ -190,10 +190,11 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
     cautions.push_back(GapText(hole, coverage.hole_mm));
   }
   if (BoneShare(coverage) > kMuchBoneInSkin) {
-    cautions.push_back(absl::StrFormat(
-        "%.1f %% of the mesh's skin (%.1f cm2) are bone or held by it: tissue is missing over the "
-        "bone there, or what is called bone is none.",
-        100 * BoneShare(coverage), coverage.mesh_skin_on_bone_mm2 / 100));
+    cautions.push_back(
+        absl::StrFormat("%.1f %% of the mesh's skin (%.1f cm2) is bone or attached to it: tissue "
+                        "is missing over the "
+                        "bone there, or other tissue was segmented as bone.",
+                        100 * BoneShare(coverage), coverage.mesh_skin_on_bone_mm2 / 100));
   }
   return cautions;
 }
@@ -202,15 +203,15 @@ std::vector<std::string> CutCautions(const SkinCoverage& coverage) {
   std::vector<std::string> cautions;
   for (const ScannerCut& cut : coverage.cuts) {
     std::string text = absl::StrFormat(
-        "The scanner's circle, or a side of the CT, cuts the face at %s: %.0f mm2, between %s and "
-        "%s. What lies beyond is not in the CT and not in the model. The cut is no skin: it is "
+        "The field of view, or a border of the CT, cuts the face at %s: %.0f mm2, between %s and "
+        "%s. The face extends beyond it; the model does not. The cut is not treated as skin: it is "
         "counted neither as covered nor as missing.",
         PlaceText(cut.middle), cut.area_mm2, PlaceText(cut.low), PlaceText(cut.high));
     const std::string regions = CutRegionsText(cut);
     if (!regions.empty()) {
-      absl::StrAppend(
-          &text, " It lies in the front of the face that a prediction is looked at for: of ",
-          regions, " no skin is predicted there, and nothing about its shape is judged.");
+      absl::StrAppend(&text,
+                      " It is in the front of the face, where predictions are evaluated: at ",
+                      regions, " no skin is predicted, and its shape is not checked.");
     }
     cautions.push_back(std::move(text));
   }
@@ -273,7 +274,7 @@ std::vector<LegendEntry> CoverageLegend(const SkinCoverage& coverage) {
       {absl::StrFormat("missing: farther than %.1f mm", coverage.tolerance_mm), kMissingColour},
       {absl::StrFormat("farther than %.1f mm", gap_mm), kGapColour}};
   if (coverage.cut_triangles.rows() > 0) {
-    legend.push_back({"cut by the scanner's circle: no skin", kScannerCutColour});
+    legend.push_back({"cut by the field of view: not skin", kScannerCutColour});
   }
   return legend;
 }

@@ -22,7 +22,8 @@ nlohmann::ordered_json LipsJson(const LipContact& contact) {
                                  {"joined_depth_mm", contact.depth_mm}};
   if (contact.width_mm > 0) json["joined_at_mm"] = ToJson(contact.place_mm);
   json["joined_means"] =
-      "along the middle of the mouth, where no air parts the lips: the model has them as one piece "
+      "along the middle of the mouth, where no air separates the lips: the model treats them as "
+      "one piece "
       "of tissue, which neither opens nor slides";
   return json;
 }
@@ -33,7 +34,7 @@ std::vector<std::string> LipsCautions(const LipContact& contact) {
       "The lips are closed in this CT and one piece of tissue in the model: over %.0f of the "
       "middle "
       "%.0f mm of the mouth, %.0f mm deep on average (%.0f mm2), about (%.0f, %.0f, %.0f) mm. They "
-      "move together: what parts them, or lets one slide on the other, is not predicted.",
+      "move together: opening, and sliding of one on the other, are not predicted.",
       contact.width_mm, contact.examined_mm, contact.depth_mm, contact.area_mm2,
       contact.place_mm.x(), contact.place_mm.y(), contact.place_mm.z())};
 }

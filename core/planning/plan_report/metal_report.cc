@@ -49,7 +49,7 @@ Json MetalJson(const PlanBuild& build) {
   json["corrected_slices"] = metal.corrected_slices;
   json["streaks_removed_mm3"] = build.head.streaks_mm3;
   json["streaks_removed_means"] =
-      "still as dense as bone after the correction, but no taller than a streak: soft tissue";
+      "still as dense as bone after the correction, but as thin as a streak: soft tissue";
   json["pieces"] = Json::array();
   for (const MetalCluster& cluster : metal.clusters) {
     json["pieces"].push_back({{"volume_mm3", cluster.volume_mm3},
@@ -66,16 +66,18 @@ std::vector<std::string> MetalCautions(const PlanBuild& build) {
   if (!metal.any()) return {};
   std::vector<std::string> cautions = {absl::StrFormat(
       "There is metal in the mouth: %d piece%s of %.1f cm3 together, from z = %.1f to %.1f mm. Its "
-      "streaks were lessened in %d slices (picture: before and after). Within about 5 mm of it the "
-      "edges of teeth, bone, lips and cheeks are uncertain, and so are the teeth's landmarks: look "
-      "at them, and give \"occlusal_plane\" and the segments' planes in the recipe where they are "
+      "artifacts were reduced in %d slices (picture: before and after). Within about 5 mm of it "
+      "the "
+      "edges of teeth, bone, lips and cheeks are uncertain, and so are the teeth's landmarks: "
+      "check "
+      "them, and set \"occlusal_plane\" and the segments' planes in the recipe where they are "
       "wrong.",
       static_cast<int>(metal.clusters.size()), metal.clusters.size() == 1 ? "" : "s",
       metal.volume_mm3 / 1000, metal.low_z_mm, metal.high_z_mm, metal.corrected_slices)};
   if (metal.volume_mm3 > kMuchMetalMm3) {
     cautions.push_back(absl::StrFormat(
-        "So much metal (%.1f cm3) hides most of the teeth: planes and landmarks that were found "
-        "from them may be wrong by several mm. Give \"occlusal_plane\" and the planes of the "
+        "This much metal (%.1f cm3) hides most of the teeth: automatic planes and landmarks "
+        "from them may be wrong by several mm. Set \"occlusal_plane\" and the planes of the "
         "segments in the recipe.",
         metal.volume_mm3 / 1000));
   }
@@ -89,9 +91,9 @@ MetalSlices DrawMetalSlices(const PlanBuild& build) {
     const Eigen::Vector3d through(over.origin_mm.x(), over.origin_mm.y(), z);
     const std::string at = absl::StrFormat("z = %.1f mm, ", z);
     slices.before.push_back(
-        DrawPlainSlice(build.before_correction, over, AxialSlice(at + "as it was", through)));
+        DrawPlainSlice(build.before_correction, over, AxialSlice(at + "original", through)));
     slices.after.push_back(
-        DrawPlainSlice(build.head.hu, over, AxialSlice(at + "streaks lessened", through)));
+        DrawPlainSlice(build.head.hu, over, AxialSlice(at + "artifacts reduced", through)));
   }
   return slices;
 }

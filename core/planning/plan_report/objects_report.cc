@@ -52,7 +52,7 @@ const char* KindText(ObjectKind kind) {
     case ObjectKind::kUnknown:
       break;
   }
-  return "Something that is larger than an ear, and may hold a part of the face,";
+  return "An object that is larger than an ear, and may contain a part of the face,";
 }
 
 const char* KindKey(ObjectKind kind) {
@@ -78,11 +78,12 @@ QualityCheck CheckObjects(const PlanBuild& build) {
     largest_mm2 = contact.area_mm2;
     place = contact.middle;
   }
-  return {"Pieces taken from the skin that may be face",
-          absl::StrFormat("none that lay on more than %.1f cm2", kLargestHoleMm2 / 100),
-          largest_mm2 == 0 ? "none"
-                           : absl::StrFormat("one that lay on %.1f cm2 at (%.0f, %.0f, %.0f) mm",
-                                             largest_mm2 / 100, place.x(), place.y(), place.z()),
+  return {"Objects removed from the skin that may be face",
+          absl::StrFormat("none in contact with more than %.1f cm2", kLargestHoleMm2 / 100),
+          largest_mm2 == 0
+              ? "none"
+              : absl::StrFormat("one in contact with %.1f cm2 at (%.0f, %.0f, %.0f) mm",
+                                largest_mm2 / 100, place.x(), place.y(), place.z()),
           largest_mm2 <= kLargestHoleMm2};
 }
 
@@ -92,9 +93,9 @@ std::vector<std::string> ObjectsCautions(const PlanBuild& build) {
     const Contact contact = ContactOf(object, build.soft_tissue.region);
     if (contact.area_mm2 == 0) continue;
     cautions.push_back(absl::StrFormat(
-        "%s lies on the skin and was taken away (%.1f cm3). The skin under it, about %.1f cm2 "
-        "between (%.0f, %.0f, %.0f) and (%.0f, %.0f, %.0f) mm, is not seen in this CT, and its "
-        "edge there is a guess.",
+        "%s on the skin was removed (%.1f cm3). The skin under it, about %.1f cm2 "
+        "between (%.0f, %.0f, %.0f) and (%.0f, %.0f, %.0f) mm, is not visible in this CT, and its "
+        "boundary there is estimated.",
         KindText(object.kind), object.volume_mm3 / 1e3, contact.area_mm2 / 100, contact.low.x(),
         contact.low.y(), contact.low.z(), contact.high.x(), contact.high.y(), contact.high.z()));
   }

@@ -66,7 +66,7 @@ QualityCheck CheckVolume(const PlanMeasures& measures) {
 
 QualityCheck CheckSkin(const std::string& what, double voxels, double limit_voxels,
                        double spacing_mm) {
-  return {absl::StrCat("Distance of the skin from the CT's, ", what),
+  return {absl::StrCat("Distance of the skin to the CT's, ", what),
           absl::StrFormat("at most %g voxels", limit_voxels),
           absl::StrFormat("%.2f voxels (%.2f mm)", voxels, voxels * spacing_mm),
           voxels <= limit_voxels};

@@ -35,7 +35,7 @@ absl::Status WriteScenes(const ReportPicture& picture, std::vector<Scene> scenes
 }
 
 std::vector<LegendEntry> BoneLegend(const PlanBuild& build) {
-  std::vector<LegendEntry> legend = {{"bone that stays", kFixedBoneColour}};
+  std::vector<LegendEntry> legend = {{"fixed bone", kFixedBoneColour}};
   for (size_t s = 0; s < build.segments.size(); ++s) {
     legend.push_back({build.segments[s].cut.name, SegmentColour(s)});
   }
@@ -49,11 +49,11 @@ std::vector<LegendEntry> WithTissue(std::vector<LegendEntry> legend, const std::
 
 absl::StatusOr<ReportPicture> DrawSlices(const PlanBuild& build, const std::string& folder) {
   ReportPicture picture{
-      "slices.png", "The CT and what was found in it",
-      "Four slices of the resampled CT, with everything that is not head removed. Radiological "
+      "slices.png", "The CT and its segmentation",
+      "Four slices of the resampled CT, with other objects removed. Radiological "
       "convention: the patient's right (R) is at the left of the picture, and the midsagittal "
       "slice looks to the left.",
-      WithTissue(BoneLegend(build), "soft tissue that is modelled")};
+      WithTissue(BoneLegend(build), "modeled soft tissue")};
   std::vector<Picture> panels;
   for (const SlicePlane& plane : PlanSlices(build.landmarks)) {
     panels.push_back(DrawSlice(build, plane));
@@ -68,9 +68,9 @@ absl::StatusOr<ReportPicture> DrawSlices(const PlanBuild& build, const std::stri
 absl::StatusOr<ReportPicture> DrawMetal(const PlanBuild& build, const std::string& folder) {
   ReportPicture picture{
       "metal.png",
-      "Metal, before and after its streaks were lessened",
-      "Slices of the resampled CT through the largest pieces of metal: above as the scanner made "
-      "them, below as the plan was made from them.",
+      "Metal, before and after artifact reduction",
+      "Slices of the resampled CT through the largest pieces of metal: above the original "
+      "images, below the corrected ones, from which the plan was made.",
       {}};
   MetalSlices slices = DrawMetalSlices(build);
   Figure figure(picture.title);
@@ -81,7 +81,7 @@ absl::StatusOr<ReportPicture> DrawMetal(const PlanBuild& build, const std::strin
 }
 
 absl::StatusOr<ReportPicture> DrawBone(const PlanBuild& build, const std::string& folder) {
-  ReportPicture picture{"bone.png", "Bone: what stays and what moves",
+  ReportPicture picture{"bone.png", "Bone: fixed and moving",
                         "Isosurfaces of the bone's labels, before the planned move.",
                         BoneLegend(build)};
   TF_ASSIGN_OR_RETURN(std::vector<Scene> scenes, BoneScenes(build));
@@ -102,14 +102,14 @@ absl::StatusOr<ReportPicture> DrawSkin(const PlanBuild& build, const std::string
         std::pair("other skin", SkinRegion::kNone)}) {
     picture.legend.push_back({name, SkinRegionColour(region)});
   }
-  picture.legend.push_back({"no skin", kCutColour});
+  picture.legend.push_back({"not skin", kCutColour});
   TF_RETURN_IF_ERROR(WriteScenes(picture, SkinScenes(build), folder));
   return picture;
 }
 
 absl::StatusOr<ReportPicture> DrawCoverage(const PlanBuild& build, const std::string& folder) {
   ReportPicture picture{
-      "coverage.png", "The CT's own skin, and what of it the mesh lacks",
+      "coverage.png", "Skin of the CT, and where the mesh misses it",
       "The outer skin of the CT within the region of interest. Red is missing in the mesh.",
       CoverageLegend(build.coverage)};
   Figure figure(picture.title);
@@ -122,12 +122,12 @@ absl::StatusOr<ReportPicture> DrawCoverage(const PlanBuild& build, const std::st
 
 absl::StatusOr<ReportPicture> DrawConstraints(const PlanBuild& build, const std::string& folder) {
   ReportPicture picture{
-      "constraints.png", "What holds and what moves the tissue",
-      "Where the tet mesh lies on bone, without the rest of its boundary. In the contact band "
-      "between bone that stays and bone that moves it is left free, so that no tissue is torn.",
+      "constraints.png", "Where tissue is fixed and moved",
+      "The tet mesh's boundary on bone, without the rest. In the contact band "
+      "between fixed bone and bone that moves it is left free, so that no tissue is torn.",
       WithTissue(BoneLegend(build), "free")};
   picture.legend.push_back({"cut through tissue, fixed", kCutColour});
-  picture.legend.push_back({"on bone, left free", kFreedColour});
+  picture.legend.push_back({"on bone, free", kFreedColour});
   TF_RETURN_IF_ERROR(WriteScenes(picture, ConstraintScenes(build), folder));
   return picture;
 }
@@ -160,9 +160,9 @@ absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
                                              const std::string& folder) {
   ReportPicture picture{"quality.png",
                         "Quality of the mesh",
-                        "Left: the smallest dihedral angle of every tet; 99.9 % must reach 3 "
-                        "degrees. Right: how far the skin of the mesh lies from the CT's; the mean "
-                        "may be 0.6 voxels, 99 % must lie within 2.",
+                        "Left: the smallest dihedral angle of each tet; 99.9 % must reach 3 "
+                        "degrees. Right: distance of the mesh's skin to the CT's; the mean "
+                        "must be at most 0.6 voxels, and 99 % within 2.",
                         {}};
   const Curve angles = HistogramCurve(DihedralHistogram(measures), "tets", kBlue);
   const Curve distances =
@@ -174,7 +174,7 @@ absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
                 .x_title = "angle [degrees]",
                 .y_title = "tets [%]",
                 .curves = {angles, LimitCurve("3 degrees", 3, angles, CurveStyle::kDashed)}},
-               {.title = "Distance of the skin from the CT's",
+               {.title = "Distance of the skin to the CT's",
                 .x_title = "distance [voxels]",
                 .y_title = "vertices on skin [%]",
                 .logarithmic_y = true,

@@ -27,7 +27,7 @@ absl::StatusOr<std::vector<ReportPicture>> Draw(const PlanBuild& build,
   std::filesystem::create_directory(folder, error);
   if (error) {
     return absl::FailedPreconditionError(
-        absl::StrCat("cannot make the folder ", folder.string(), ": ", error.message()));
+        absl::StrCat("cannot create the folder ", folder.string(), ": ", error.message()));
   }
   return DrawPlanPictures(build, measures, folder.string());
 }

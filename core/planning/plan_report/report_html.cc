@@ -86,7 +86,7 @@ std::string Facts(const Json& report) {
       Fact(absl::StrFormat("%.0f cm³", tissue_cm3), "soft tissue"),
       Fact(absl::StrCat(report["segments"].size()), "moved segments"),
       Fact(absl::StrFormat("%.2f mm", report["distances"]["skin_to_ct"]["mean_mm"].get<double>()),
-           "mean distance of the skin from the CT's"),
+           "mean distance of the skin to the CT's"),
       "</div>\n");
 }
 
@@ -148,7 +148,7 @@ std::string CautionsSection(const Json& cautions) {
   for (const Json& caution : cautions) {
     absl::StrAppend(&items, "<li>", EscapeHtml(caution.get<std::string>()), "</li>\n");
   }
-  return Section("Mind about this CT", absl::StrCat("<ul>\n", items, "</ul>\n"));
+  return Section("Limitations of this CT", absl::StrCat("<ul>\n", items, "</ul>\n"));
 }
 
 std::string LegendHtml(const std::vector<LegendEntry>& legend) {
@@ -194,7 +194,7 @@ std::string MetalSection(const Json& report) {
 std::string Tables(const Json& report) {
   return absl::StrCat(
       Section("Segments", SegmentTables(report["segments"])),
-      Section("Bone and how it was told apart", JsonTable(report["bone"])), MetalSection(report),
+      Section("Bone and its separation", JsonTable(report["bone"])), MetalSection(report),
       Section("Mesh", JsonTable(report["mesh"])),
       Section("Distances", JsonTable(report["distances"])),
       Section("The CT's skin in the mesh", JsonTable(report["coverage"])),

@@ -105,7 +105,7 @@ absl::StatusOr<std::string> EncodeIndexedPng(vtkImageData* picture) {
   png_alloc_size_t size = bytes.size();
   if (png_image_write_to_memory(&image, bytes.data(), &size, 0, indices.data(), width,
                                 palette.data()) == 0) {
-    return absl::InternalError(absl::StrCat("libpng makes no picture: ", image.message));
+    return absl::InternalError(absl::StrCat("libpng cannot write the picture: ", image.message));
   }
   bytes.resize(size);
   return bytes;

@@ -74,7 +74,7 @@ absl::Status VirtualDisplay::Start() {
   int number = 0;
   if (!absl::SimpleAtoi(ReadLine((*server)->answer()), &number)) {
     return absl::UnavailableError(
-        "Xvfb does not start; try it by hand (Xvfb :99) or set DISPLAY to a usable display");
+        "Xvfb does not start; run it by hand (Xvfb :99), or set DISPLAY to a usable display");
   }
   if (const char* former = std::getenv("DISPLAY")) former_display_ = former;
   server_ = *std::move(server);

@@ -57,7 +57,7 @@ absl::StatusOr<std::string> ReadBoundedFile(const std::string& path, size_t max_
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat status = {};
   if (file.number() < 0 || fstat(file.number(), &status) != 0) return CannotRead();
-  if (!S_ISREG(status.st_mode)) return absl::InvalidArgumentError("it is no regular file");
+  if (!S_ISREG(status.st_mode)) return absl::InvalidArgumentError("it is not a regular file");
   std::string content(max_bytes + 1, '\0');
   size_t size = 0;
   while (size < content.size()) {

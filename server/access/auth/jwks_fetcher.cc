@@ -70,18 +70,17 @@ void SetUp(CURL* handle, const std::string& url, const std::atomic<bool>& stoppi
 absl::Status CheckJwksUrl(const std::string& url) {
   const std::unique_ptr<CURLU, EndUrl> parsed(curl_url());
   if (curl_url_set(parsed.get(), CURLUPART_URL, url.c_str(), 0) != CURLUE_OK) {
-    return absl::InvalidArgumentError("it is no URL; write https://HOST/PATH");
+    return absl::InvalidArgumentError("it is not a URL; write https://HOST/PATH");
   }
   if (!PartOf(parsed.get(), CURLUPART_USER).empty() ||
       !PartOf(parsed.get(), CURLUPART_PASSWORD).empty()) {
-    return absl::InvalidArgumentError("it holds a user or a password; public keys need none");
+    return absl::InvalidArgumentError("it contains a user or a password; remove it");
   }
   const std::string scheme = PartOf(parsed.get(), CURLUPART_SCHEME);
   const std::string host = PartOf(parsed.get(), CURLUPART_HOST);
   const bool here = std::find(kLoopback.begin(), kLoopback.end(), host) != kLoopback.end();
   if (scheme == "https" || (scheme == "http" && here)) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      "it must be https; keys that come unencrypted may be anybody's");
+  return absl::InvalidArgumentError("it must use https");
 }
 
 absl::StatusOr<std::string> DownloadJwks(const std::string& url,
@@ -100,7 +99,7 @@ absl::StatusOr<std::string> DownloadJwks(const std::string& url,
   long http = 0;
   curl_easy_getinfo(handle.get(), CURLINFO_RESPONSE_CODE, &http);
   if (http == kOk) return answer;
-  return absl::UnavailableError(absl::StrCat("it answers with HTTP status ", http, ", not 200"));
+  return absl::UnavailableError(absl::StrCat("HTTP status ", http, " instead of 200"));
 }
 
 JwksFetcher::JwksFetcher(std::string url, const JwksTimes& times, bool asked_well, Take take)

@@ -45,8 +45,7 @@ bool IsForTokens(const nlohmann::json& key) {
 
 absl::StatusOr<VerificationKey::Pointer> KeyOf(const nlohmann::json& key) {
   if (key.contains("d")) {
-    return absl::InvalidArgumentError(
-        "there is a private key; a server needs the public one alone, so take the other away");
+    return absl::InvalidArgumentError("it contains a private key; keep only the public key");
   }
   const bool rsa = TextOf(key, "kty") == "RSA";
   TF_ASSIGN_OR_RETURN(const std::string first, NumberBytes(key, rsa ? "n" : "x"));
@@ -57,21 +56,21 @@ absl::StatusOr<VerificationKey::Pointer> KeyOf(const nlohmann::json& key) {
 absl::Status AddKey(std::string kid, VerificationKey::Pointer key, KeyMap* keys) {
   if (kid.empty()) kid = key->thumbprint();
   if (keys->emplace(std::move(kid), std::move(key)).second) return absl::OkStatus();
-  return absl::InvalidArgumentError("two keys have one name (`kid`)");
+  return absl::InvalidArgumentError("two keys have the same `kid`");
 }
 
 absl::Status ReadJwks(absl::string_view text, KeyMap* keys) {
   const nlohmann::json set = nlohmann::json::parse(text.begin(), text.end(), nullptr, false);
   const auto listed = set.is_object() ? set.find("keys") : set.end();
   if (!set.is_object() || listed == set.end() || !listed->is_array()) {
-    return absl::InvalidArgumentError("it is no JSON Web Key Set: {\"keys\": [...]}");
+    return absl::InvalidArgumentError("it is not a JSON Web Key Set: {\"keys\": [...]}");
   }
   if (listed->size() > KeySet::kMaxKeys) {
     return absl::InvalidArgumentError(
         absl::StrCat("there are more than ", KeySet::kMaxKeys, " keys"));
   }
   for (const nlohmann::json& key : *listed) {
-    if (!key.is_object()) return absl::InvalidArgumentError("a key is no JSON object");
+    if (!key.is_object()) return absl::InvalidArgumentError("a key is not a JSON object");
     if (!IsForTokens(key)) continue;
     TF_ASSIGN_OR_RETURN(VerificationKey::Pointer verifier, KeyOf(key));
     TF_RETURN_IF_ERROR(AddKey(TextOf(key, "kid"), std::move(verifier), keys));
@@ -92,7 +91,7 @@ absl::Status ReadPem(absl::string_view text, KeyMap* keys) {
 
 absl::StatusOr<std::shared_ptr<const KeySet>> KeySet::Parse(absl::string_view text) {
   if (text.size() > kMaxBytes) {
-    return absl::InvalidArgumentError("it is larger than 1 MiB; give the signing keys alone");
+    return absl::InvalidArgumentError("it is larger than 1 MiB; keep only the signing keys");
   }
   auto set = std::make_shared<KeySet>();
   const bool json = absl::StartsWith(absl::StripLeadingAsciiWhitespace(text), "{");

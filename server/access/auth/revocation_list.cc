@@ -27,7 +27,7 @@ absl::Status ReadStrings(const nlohmann::json& array, absl::string_view name, St
         return item.is_string() && !item.get_ref<const std::string&>().empty();
       });
   if (!strings) {
-    return absl::InvalidArgumentError(absl::StrCat("\"", name, "\" is no list of strings"));
+    return absl::InvalidArgumentError(absl::StrCat("\"", name, "\" is not a list of strings"));
   }
   for (const nlohmann::json& item : array) into->insert(item.get<std::string>());
   return absl::OkStatus();
@@ -42,7 +42,7 @@ absl::Status CheckDigests(const StringSet& digests) {
   });
   if (whole) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      "a token's digest is not 64 lower-case hexadecimal digits; take it from `tissueform token "
+      "a token digest is not 64 lower-case hexadecimal digits; copy it from `tissueform token "
       "show`");
 }
 
@@ -54,7 +54,7 @@ absl::StatusOr<std::chrono::system_clock::time_point> TimeOfText(const nlohmann:
     return absl::ToChronoTime(time);
   }
   return absl::InvalidArgumentError(
-      "a principal's time is not like \"2026-11-23T12:00:00Z\"; write it so");
+      "a principal's time does not have the form \"2026-11-23T12:00:00Z\"");
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ absl::StatusOr<std::shared_ptr<const RevocationList>> RevocationList::Parse(
     absl::string_view text) {
   if (text.size() > kMaxBytes) return absl::InvalidArgumentError("it is larger than 8 MiB");
   const nlohmann::json object = nlohmann::json::parse(text.begin(), text.end(), nullptr, false);
-  if (!object.is_object()) return absl::InvalidArgumentError("it is no JSON object");
+  if (!object.is_object()) return absl::InvalidArgumentError("it is not a JSON object");
   auto list = std::make_shared<RevocationList>();
   for (const auto& [name, value] : object.items()) {
     if (name == "token_digests") {
@@ -76,7 +76,7 @@ absl::StatusOr<std::shared_ptr<const RevocationList>> RevocationList::Parse(
       }
     } else {
       return absl::InvalidArgumentError(
-          "it has a member that is none of \"token_digests\", \"token_ids\" (lists) and "
+          "it has an unknown member; allowed: \"token_digests\", \"token_ids\" (lists) and "
           "\"principals\" (an object)");
     }
   }

@@ -22,7 +22,7 @@ constexpr std::chrono::seconds kBetweenLines{1};
 
 void LogAlarm(const absl::Status& taken) {
   if (taken.ok()) return;
-  spdlog::error("{}; what was known before stays", std::string(taken.message()));
+  spdlog::error("{}; the previous values stay in use", std::string(taken.message()));
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ void TokenAuthenticator::Tell(const absl::Status& refusal) {
     return;
   }
   next_line_ = now + kBetweenLines;
-  spdlog::info("a caller was refused: {}; {} others since the last such line",
+  spdlog::info("refused a caller: {}; {} others since the last line of this kind",
                std::string(refusal.message()), std::exchange(unlogged_, 0));
 }
 
@@ -115,9 +115,10 @@ absl::StatusOr<Authenticated> TokenAuthenticator::Verify(absl::string_view token
   const VerificationKey::Pointer key = trust_.keys()->Find(header.kid, header.algorithm);
   if (key == nullptr) {
     if (fetcher_ != nullptr) fetcher_->Ask();
-    return RefuseToken(TokenFailure::kUnknownKey, absl::StrCat("the token's key is not one of ",
-                                                               QuoteForCaller(options_.issuer),
-                                                               ", whose tokens this server takes"));
+    return RefuseToken(
+        TokenFailure::kUnknownKey,
+        absl::StrCat("the token's key does not belong to ", QuoteForCaller(options_.issuer),
+                     ", whose tokens this server accepts"));
   }
   if (key->algorithm() != header.algorithm) return RefuseToken(TokenFailure::kAlgorithm);
   if (!key->Verifies(parts.signed_text, parts.signature)) {

@@ -102,7 +102,7 @@ std::string Quote(const Json* claim) {
 
 absl::Status RefuseIssuer(const Json* found, const std::string& expected) {
   return RefuseToken(TokenFailure::kIssuer, absl::StrCat("the token's issuer is ", Quote(found),
-                                                         ", and this server takes tokens of ",
+                                                         "; this server accepts only tokens of ",
                                                          QuoteForCaller(expected), " only"));
 }
 
@@ -113,10 +113,9 @@ absl::Status RefuseAudience(const Json* found, const std::vector<std::string>& e
 }
 
 absl::Status RefuseNotYetValid(SystemTime::duration wait, std::chrono::seconds leeway) {
-  return RefuseToken(
-      TokenFailure::kNotYetValid,
-      absl::StrCat("the token begins in ", InWords(wait),
-                   " by the server's clock, which may differ by ", leeway.count(), " s"));
+  return RefuseToken(TokenFailure::kNotYetValid,
+                     absl::StrCat("the token becomes valid in ", InWords(wait),
+                                  " by the server's clock (tolerance ", leeway.count(), " s)"));
 }
 
 // Of an array of strings; empty where there is none.

@@ -14,37 +14,36 @@ bool TokenOptions::configured() const {
 
 void AddTokenOptions(CLI::App& app, TokenOptions* options) {
   app.add_option("--token-issuer", options->issuer,
-                 "who makes the tokens that callers bring: their claim `iss`, to the letter; "
-                 "without --token-* nobody logs in, and everything is everybody's")
+                 "issuer of accepted tokens, exactly as in their claim `iss`; "
+                 "without --token-* there is no login, and every caller can access everything")
       ->type_name("URL");
   app.add_option("--token-audience", options->audiences,
-                 "this server, as tokens name it in `aud`; may be given several times")
+                 "this server's name in the claim `aud` (repeatable)")
       ->type_name("NAME")
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   CLI::Option* file =
       app.add_option("--token-keys", options->keys_file,
-                     "file with the issuer's public keys (PEM, or a JSON Web Key Set); a changed "
-                     "one is read while the server runs")
+                     "file with the issuer's public keys (PEM, or a JSON Web Key Set); changes are "
+                     "read while the server runs")
           ->type_name("FILE");
   app.add_option("--token-jwks-url", options->jwks_url,
-                 "where the issuer tells its keys: https, or http on this machine; asked every 15 "
-                 "minutes, and when a token names a key that is not known")
+                 "URL of the issuer's keys: https, or http on this machine; fetched every 15 "
+                 "minutes, and when a token names an unknown key")
       ->type_name("URL")
       ->excludes(file);
   app.add_option("--token-revocations", options->revocations_file,
-                 "JSON file with tokens and principals that are good no longer (docs/security.md); "
-                 "a changed one counts within a second")
+                 "JSON file of revoked tokens and principals (docs/security.md); "
+                 "changes apply within a second")
       ->type_name("FILE");
 }
 
 absl::Status CheckTokenOptions(const TokenOptions& options) {
   if (options.issuer.empty()) {
-    return absl::InvalidArgumentError("tokens need --token-issuer: the `iss` of those to take");
+    return absl::InvalidArgumentError("tokens need --token-issuer: the accepted `iss`");
   }
   if (options.issuer.find('{') != std::string::npos) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("--token-issuer ", options.issuer,
-                     " has a placeholder, which no token has; put your tenant's id in its place"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--token-issuer ", options.issuer, " has a placeholder; replace it with your tenant's id"));
   }
   if (options.audiences.empty()) {
     return absl::InvalidArgumentError("tokens need --token-audience: this server's name in `aud`");

@@ -88,7 +88,7 @@ absl::Status CheckRsa(const EVP_PKEY* key) {
   const BigNumber exponent = NumberOf(key, OSSL_PKEY_PARAM_RSA_E);
   if (exponent == nullptr || !BN_is_odd(exponent.get()) || BN_is_one(exponent.get()) ||
       BN_num_bits(exponent.get()) > kMaxExponentBits) {
-    return absl::InvalidArgumentError("an RSA key's exponent is unusable; use 65537");
+    return absl::InvalidArgumentError("an RSA key has an invalid exponent; use 65537");
   }
   return absl::OkStatus();
 }
@@ -98,13 +98,13 @@ absl::Status CheckP256(EVP_PKEY* key) {
   size_t size = 0;
   if (EVP_PKEY_get_group_name(key, group.data(), group.size(), &size) != 1 ||
       absl::string_view(group.data(), size) != kP256) {
-    return absl::InvalidArgumentError("a key lies on another curve than P-256; use that");
+    return absl::InvalidArgumentError("a key uses another curve than P-256; use P-256");
   }
   const std::unique_ptr<EVP_PKEY_CTX, Free<EVP_PKEY_CTX_free>> context(
       EVP_PKEY_CTX_new_from_pkey(nullptr, key, nullptr));
   if (context == nullptr || EVP_PKEY_public_check(context.get()) != 1) {
     ERR_clear_error();
-    return absl::InvalidArgumentError("a key is no point of P-256");
+    return absl::InvalidArgumentError("a key is not a point of P-256");
   }
   return absl::OkStatus();
 }
@@ -185,7 +185,7 @@ absl::StatusOr<VerificationKey::Pointer> VerificationKey::FromEvp(std::unique_pt
     return Pointer(
         new VerificationKey(std::move(evp), TokenAlgorithm::kEs256, std::move(thumbprint)));
   }
-  return absl::InvalidArgumentError("a key is neither RSA nor on the curve P-256; use one of them");
+  return absl::InvalidArgumentError("a key is neither RSA nor P-256; use one of them");
 }
 
 absl::StatusOr<VerificationKey::Pointer> VerificationKey::FromRsa(absl::string_view modulus,
@@ -215,15 +215,14 @@ absl::StatusOr<VerificationKey::Pointer> VerificationKey::FromP256(absl::string_
                                    point.size());
   auto evp = std::make_unique<Evp>();
   evp->key.reset(FromParameters("EC", builder.get()));
-  if (evp->key == nullptr) return absl::InvalidArgumentError("a key is no point of P-256");
+  if (evp->key == nullptr) return absl::InvalidArgumentError("a key is not a point of P-256");
   return FromEvp(std::move(evp));
 }
 
 absl::StatusOr<std::vector<VerificationKey::Pointer>> VerificationKey::FromPem(
     absl::string_view text) {
   if (absl::StrContains(text, "PRIVATE KEY")) {
-    return absl::InvalidArgumentError(
-        "there is a private key; a server needs the public one alone, so take the other away");
+    return absl::InvalidArgumentError("it contains a private key; keep only the public key");
   }
   const std::unique_ptr<BIO, Free<BIO_free_all>> bio(
       BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
@@ -231,7 +230,7 @@ absl::StatusOr<std::vector<VerificationKey::Pointer>> VerificationKey::FromPem(
   while (const std::optional<PemBlock> block = NextBlock(bio.get())) {
     if (keys.size() == kMaxPemKeys) return absl::InvalidArgumentError("there are too many keys");
     if (block->name != PEM_STRING_PUBLIC) {
-      return absl::InvalidArgumentError("there is something else than public keys; take it away");
+      return absl::InvalidArgumentError("it contains something other than public keys; remove it");
     }
     const unsigned char* bytes = Bytes(block->content);
     auto evp = std::make_unique<Evp>();
@@ -241,8 +240,7 @@ absl::StatusOr<std::vector<VerificationKey::Pointer>> VerificationKey::FromPem(
   const bool whole = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
   ERR_clear_error();
   if (!keys.empty() && whole) return keys;
-  return absl::InvalidArgumentError(
-      "there is no `-----BEGIN PUBLIC KEY-----`, or what follows is damaged");
+  return absl::InvalidArgumentError("no `-----BEGIN PUBLIC KEY-----`, or the key is damaged");
 }
 
 bool VerificationKey::Verifies(absl::string_view signed_text, absl::string_view signature) const {

@@ -110,8 +110,8 @@ absl::Status CopyAll(Database& source, const BackUpOptions& options, Copy* copy)
     if (whole) return absl::OkStatus();
   }
   return absl::AbortedError(
-      absl::StrCat("data folder: its rows claim files that are not there, in ", kAttempts,
-                   " copies; try again, or start the server again, which sets damaged rows aside"));
+      absl::StrCat("data folder: its rows name missing files, in ", kAttempts,
+                   " copies; try again, or restart the server, which sets damaged rows aside"));
 }
 
 }  // namespace
@@ -122,10 +122,9 @@ absl::StatusOr<BackupSummary> BackUp(const std::string& data_folder, const std::
   std::error_code ignored;
   // Opening would make one.
   if (!std::filesystem::exists(database, ignored)) {
-    return absl::NotFoundError(
-        absl::StrCat("data folder ", data_folder,
-                     ": no server has kept anything there, or you may not look; "
-                     "name another one by --data-dir"));
+    return absl::NotFoundError(absl::StrCat("data folder ", data_folder,
+                                            ": it has no server's data, or you may not read it; "
+                                            "name another one by --data-dir"));
   }
   TF_ASSIGN_OR_RETURN(AtomicFolder folder, AtomicFolder::Create(backup));
   TF_RETURN_IF_ERROR(MakePrivate(folder.path()));

@@ -51,7 +51,7 @@ absl::Status AddClaims(Database& database, const ClaimingTable& table,
     if (!row) return absl::OkStatus();
     // It becomes the name of a file.
     if (!IsSha256Hex(query.Text(0))) {
-      return Damaged(database.path(), "a row claims a file whose name is no SHA-256");
+      return Damaged(database.path(), "a row names a file whose name is not a SHA-256");
     }
     blobs->emplace(query.Text(0));
   }
@@ -63,7 +63,7 @@ absl::StatusOr<FileDigest> ReadAll(const std::string& path,
   const auto status = std::filesystem::symlink_status(path, error);
   // Reading a pipe would wait for ever.
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    return Damaged(path, "it is no file");
+    return Damaged(path, "it is not a file");
   }
   Sha256 digest;
   FileDigest found;
@@ -88,7 +88,8 @@ absl::StatusOr<BackupContents> ReadBackupContents(const std::string& database) {
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<Database> opened, Database::OpenForReading(database));
   BackupContents contents;
   TF_ASSIGN_OR_RETURN(contents.schema_version, SchemaVersionOf(*opened));
-  if (contents.schema_version == 0) return Damaged(database, "it holds nothing of ours");
+  if (contents.schema_version == 0)
+    return Damaged(database, "it has no data of a Tissueform server");
   if (const absl::Status status = QuickCheck(*opened); !status.ok()) {
     return Damaged(database, status.message());
   }
@@ -125,7 +126,7 @@ absl::StatusOr<FileDigest> CopyWithDigest(const std::string& from, const std::st
 absl::Status CheckDigest(const FileDigest& found, const std::string& sha256,
                          const std::string& path) {
   if (found.sha256 == sha256) return absl::OkStatus();
-  return Damaged(path, "its bytes have another SHA-256 than they should");
+  return Damaged(path, "its SHA-256 is wrong");
 }
 
 }  // namespace tissueform

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 absl::Status Missing(const std::string& path) {
-  return Damaged(path, "it is not there; take another backup");
+  return Damaged(path, "it is missing; use another backup");
 }
 
 // What the database claims, and its digest, when it agrees with SHA256SUMS.
@@ -37,7 +37,7 @@ absl::StatusOr<CheckedDatabase> CheckDatabase(const std::string& backup) {
   if (!fs::exists(path, ignored)) {
     if (has_sums) return Missing(path);
     return absl::NotFoundError(
-        absl::StrCat("backup ", backup, ": it is none; name the folder that `backup` has written"));
+        absl::StrCat("backup ", backup, ": not a backup; name a folder written by `backup`"));
   }
   CheckedDatabase checked;
   TF_ASSIGN_OR_RETURN(checked.digest, DigestOf(path));
@@ -47,12 +47,11 @@ absl::StatusOr<CheckedDatabase> CheckDatabase(const std::string& backup) {
   std::string sums;
   TF_RETURN_IF_ERROR(ReadInPieces(BackupSums(backup), [&](absl::string_view piece) {
     sums.append(piece.data(), piece.size());
-    return sums.size() > wanted.size()
-               ? Damaged(BackupSums(backup), "it does not agree with " + path)
-               : absl::OkStatus();
+    return sums.size() > wanted.size() ? Damaged(BackupSums(backup), "it does not match " + path)
+                                       : absl::OkStatus();
   }));
   if (sums == wanted) return checked;
-  return Damaged(BackupSums(backup), "it does not agree with " + path);
+  return Damaged(BackupSums(backup), "it does not match " + path);
 }
 
 // `read` gets a blob's path and returns its digest.
@@ -76,8 +75,8 @@ absl::StatusOr<BackupSummary> CheckBlobs(const std::string& backup, const Checke
 absl::Status CheckEmpty(const std::string& folder) {
   std::error_code error;
   if (!fs::exists(folder, error) || fs::is_empty(folder, error)) return absl::OkStatus();
-  return absl::AlreadyExistsError(absl::StrCat(
-      "data folder ", folder, ": it holds something; a backup is restored into an empty one"));
+  return absl::AlreadyExistsError(
+      absl::StrCat("data folder ", folder, ": it is not empty; restore into an empty folder"));
 }
 
 absl::StatusOr<BackupSummary> CopyInto(const DataFolder& folder, const std::string& backup,

@@ -53,7 +53,7 @@ absl::StatusOr<AuditKey> AuditKey::Read(const std::string& path) {
   if (fstat(fd, &status) != 0) return DiskError(path, "cannot be read");
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     return absl::FailedPreconditionError(
-        absl::StrCat("audit key ", path, ": others may read or write it; chmod 600 ", path));
+        absl::StrCat("audit key ", path, ": other users can read or write it; chmod 600 ", path));
   }
   std::array<char, 2 * kKeyBytes + 2> bytes = {};
   const ssize_t count = read(fd, bytes.data(), bytes.size());
@@ -65,7 +65,7 @@ absl::StatusOr<AuditKey> AuditKey::Read(const std::string& path) {
   if (!is_hex) {
     return absl::InvalidArgumentError(
         absl::StrCat("audit key ", path,
-                     ": is not 64 hexadecimal digits and a line feed; make it with "
+                     ": it must be 64 hexadecimal digits and a line feed; create it with "
                      "`tissueform audit keygen` or `openssl rand -hex 32`"));
   }
   return AuditKey(absl::HexStringToBytes(text));

@@ -93,7 +93,7 @@ class Verification {
     if (beyond == checkpoints_.end()) return;
     Found(AuditFault::kCut,
           absl::StrCat("the log ends with line n=", report_.last.number,
-                       ", but a checkpoint tells of line n=", checkpoints_.rbegin()->first));
+                       ", but a checkpoint names line n=", checkpoints_.rbegin()->first));
   }
 
   AuditReport report() && { return std::move(report_); }
@@ -107,7 +107,7 @@ class Verification {
   bool Take(const RawLine& raw, std::ifstream* stream) {
     const std::optional<AuditLine> line = ParseAuditLine(raw.text);
     if (!raw.ends)
-      return Found(AuditFault::kCut, "the line is not complete; the file was cut here");
+      return Found(AuditFault::kCut, "the line is incomplete; the file was truncated here");
     if (line_ == 1) return line.has_value() ? TakeFirst(*line, stream) : Unreadable(stream);
     if (!line.has_value()) return Unreadable(stream);
     if (line->number == report_.last.number + 1 && IsSealed(*line, report_.last.mac, key_)) {
@@ -119,9 +119,9 @@ class Verification {
   bool Unreadable(std::ifstream* stream) {
     const Rest rest = ReadRest(stream, "");
     if (line_ > 1 && rest.follows_last_good) {
-      return Found(AuditFault::kInserted, "this is no line of the log");
+      return Found(AuditFault::kInserted, "this is not a line of the log");
     }
-    return Found(AuditFault::kChanged, "this has not the form of a line");
+    return Found(AuditFault::kChanged, "this does not have the form of a line");
   }
 
   bool Misfit(const AuditLine& line, std::ifstream* stream) {
@@ -129,11 +129,10 @@ class Verification {
     const uint64_t number = line.number;
     const Rest rest = ReadRest(stream, std::string(line.mac), number);
     if (rest.follower == expected + 1) {
-      return Found(AuditFault::kChanged,
-                   absl::StrCat("line n=", expected, " is not what was written"));
+      return Found(AuditFault::kChanged, absl::StrCat("line n=", expected, " was changed"));
     }
     if (number < expected) {
-      return Found(AuditFault::kInserted, absl::StrCat("line n=", number, " stands here again"));
+      return Found(AuditFault::kInserted, absl::StrCat("line n=", number, " is repeated here"));
     }
     // A line that was moved here stands at no other place.
     if (rest.follows_last_good && (number == expected || rest.has_same_number)) {
@@ -141,12 +140,11 @@ class Verification {
                    absl::StrCat("this line n=", number, " was not written by the server"));
     }
     if (number == expected) {
-      return Found(AuditFault::kChanged,
-                   absl::StrCat("line n=", number, " is not what was written"));
+      return Found(AuditFault::kChanged, absl::StrCat("line n=", number, " was changed"));
     }
     if (rest.has_expected_number) {
       return Found(AuditFault::kOutOfOrder,
-                   absl::StrCat("line n=", number, " stands before line n=", expected));
+                   absl::StrCat("line n=", number, " comes before line n=", expected));
     }
     return Found(AuditFault::kRemoved, absl::StrCat(Lines(expected, number - 1), " missing"));
   }
@@ -163,7 +161,7 @@ class Verification {
                  ? Found(AuditFault::kWrongKey,
                          absl::StrCat("the file was sealed with key ", head->key_id.substr(0, 16),
                                       ", this one is ", key_.Id()))
-                 : Found(AuditFault::kChanged, "the first line is not what was written");
+                 : Found(AuditFault::kChanged, "the first line was changed");
     }
     return FollowsFileBefore(line, *head) && Accept(line);
   }
@@ -194,8 +192,8 @@ class Verification {
     const auto checkpoint = checkpoints_.find(line.number);
     if (checkpoint != checkpoints_.end() && checkpoint->second != line.mac) {
       return Found(AuditFault::kChanged, absl::StrCat("line n=", line.number,
-                                                      " is not the one that a checkpoint tells of: "
-                                                      "who has written it has the key"));
+                                                      " does not match a checkpoint: "
+                                                      "its author has the key"));
     }
     ++report_.lines;
     report_.mended += absl::StrContains(line.body, ",\"event\":\"mended\"") ? 1 : 0;
@@ -247,7 +245,7 @@ absl::string_view AuditFaultName(AuditFault fault) {
 absl::StatusOr<AuditReport> VerifyAuditFiles(const std::vector<std::string>& paths,
                                              const AuditKey& key,
                                              const std::vector<AuditCheckpoint>& checkpoints) {
-  if (paths.empty()) return absl::InvalidArgumentError("no file of an audit log is named");
+  if (paths.empty()) return absl::InvalidArgumentError("name a file of an audit log");
   std::vector<std::pair<uint64_t, std::string>> ordered;
   for (const std::string& path : paths) {
     TF_ASSIGN_OR_RETURN(const uint64_t number, FirstNumber(path));

@@ -17,7 +17,7 @@
 namespace tissueform {
 
 enum class AuditFault {
-  kChanged,      // a line is not what was written
+  kChanged,      // a line was changed
   kRemoved,      // lines are missing
   kInserted,     // a line that was not written there
   kOutOfOrder,   // lines have changed places

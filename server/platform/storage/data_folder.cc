@@ -67,18 +67,17 @@ absl::Status Make(const std::string& path) {
 
 absl::StatusOr<struct stat> LookAt(const std::string& path) {
   struct stat status {};
-  if (stat(path.c_str(), &status) != 0)
-    return FileError(errno, "data folder: cannot look at", path);
+  if (stat(path.c_str(), &status) != 0) return FileError(errno, "data folder: cannot read", path);
   return status;
 }
 
 absl::Status CheckPrivate(const std::string& path, const struct stat& status) {
   if (status.st_uid != geteuid()) {
-    return Refused(path, "it belongs to another user; name one of your own by --data-dir");
+    return Refused(path, "it belongs to another user; name your own folder with --data-dir");
   }
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    return Refused(path, absl::StrCat("others may enter it; name a folder that is the server's "
-                                      "alone, or if this one is: chmod 700 ",
+    return Refused(path, absl::StrCat("other users can enter it; name a folder of the server's own "
+                                      ", or if it is: chmod 700 ",
                                       path));
   }
   return absl::OkStatus();
@@ -99,7 +98,7 @@ absl::StatusOr<int> Lock(const std::string& path) {
     return absl::UnavailableError(
         absl::StrCat("data folder ", path, ": another server holds it",
                      pid.empty() ? "" : absl::StrCat(" (process ", pid, ")"),
-                     "; stop that one, or name another folder by --data-dir"));
+                     "; stop it, or name another folder with --data-dir"));
   }
   const std::string pid = absl::StrCat(getpid(), "\n");
   if (ftruncate(descriptor, 0) != 0 ||
@@ -124,7 +123,7 @@ absl::StatusOr<std::string> DefaultDataFolder() {
     return home + "/.local/state/tissueform";
   }
   return absl::FailedPreconditionError(
-      "data folder: neither XDG_STATE_HOME nor HOME is set; name one by --data-dir");
+      "data folder: neither XDG_STATE_HOME nor HOME is set; name one with --data-dir");
 }
 
 absl::Status CheckFileSystem(const std::string& path, int64_t type) {
@@ -132,9 +131,9 @@ absl::Status CheckFileSystem(const std::string& path, int64_t type) {
       kNetworkFileSystems.begin(), kNetworkFileSystems.end(),
       [type](const NetworkFileSystem& system) { return system.type == (type & 0xFFFFFFFF); });
   if (found == kNetworkFileSystems.end()) return absl::OkStatus();
-  return Refused(path, absl::StrCat("it lies on a network (", found->name,
-                                    "), where a power cut may lose what was acknowledged; name "
-                                    "one on a disk of this machine by --data-dir"));
+  return Refused(path, absl::StrCat("it is on a network (", found->name,
+                                    "), where a power failure may lose acknowledged data; name "
+                                    "a folder on a local disk with --data-dir"));
 }
 
 absl::StatusOr<DataFolder> DataFolder::Open(const std::string& path) {
@@ -147,7 +146,7 @@ absl::StatusOr<DataFolder> DataFolder::Open(const std::string& path) {
   TF_RETURN_IF_ERROR(CheckPrivate(folder, status));
   struct statfs system {};
   if (statfs(folder.c_str(), &system) != 0) {
-    return FileError(errno, "data folder: cannot look at", folder);
+    return FileError(errno, "data folder: cannot read", folder);
   }
   TF_RETURN_IF_ERROR(CheckFileSystem(folder, system.f_type));
   TF_ASSIGN_OR_RETURN(const int lock, Lock(folder));
@@ -172,8 +171,8 @@ absl::Status DataFolder::CheckStillThere() const {
   return NamingPath(
       absl::UnavailableError(absl::StrCat(
           "data folder ", path_,
-          ": it has been removed or replaced while the server runs, nothing can be kept; "
-          "put it back and start the server again")),
+          ": it was removed or replaced while the server runs, and nothing can be stored; "
+          "restore it and restart the server")),
       path_);
 }
 

@@ -55,20 +55,20 @@ absl::Status ToStatus(sqlite3* handle, const std::string& path) {
                               "database ", path, ": the disk is full; free some space")),
                           ErrorReason::kDiskFull);
       }
-      return absl::InternalError(absl::StrCat(message, "; look at the disk"));
+      return absl::InternalError(absl::StrCat(message, "; check the disk"));
     case SQLITE_READONLY:
       return absl::FailedPreconditionError(
           absl::StrCat(message, "; make the folder and the disk writable"));
     case SQLITE_CANTOPEN:
       if (error_number == EROFS) return FileError(error_number, "cannot open", path);
-      return absl::FailedPreconditionError(absl::StrCat(message, "; look at its folder"));
+      return absl::FailedPreconditionError(absl::StrCat(message, "; check its folder"));
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
       return absl::DataLossError(message);
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return absl::UnavailableError(
-          absl::StrCat(message, "; another program holds it, end that or try again"));
+          absl::StrCat(message, "; another program holds it: stop that program or try again"));
     default:
       return absl::InternalError(message);
   }

@@ -63,8 +63,8 @@ absl::StatusOr<OpenFile> OpenFile::Open(const std::string& path, int flags) {
   if (descriptor < 0 && errno == ENOENT && (flags & (O_CREAT | O_DIRECTORY)) != 0) {
     return NamingPath(absl::UnavailableError(absl::StrCat(
                           "cannot open ", path,
-                          ": its folder has been removed while the server runs, nothing can be "
-                          "kept; put it back and start the server again")),
+                          ": its folder was removed while the server runs, and nothing can be "
+                          "stored; restore it and restart the server")),
                       path);
   }
   if (descriptor < 0) return FileError(errno, "cannot open", path);
@@ -83,7 +83,7 @@ OpenFile& OpenFile::operator=(OpenFile&& other) noexcept {
 
 absl::StatusOr<int64_t> OpenFile::Size() const {
   struct stat status {};
-  if (fstat(descriptor_, &status) != 0) return FileError(errno, "cannot look at", path_);
+  if (fstat(descriptor_, &status) != 0) return FileError(errno, "cannot read", path_);
   return static_cast<int64_t>(status.st_size);
 }
 
@@ -128,7 +128,7 @@ absl::Status MakeFolder(const std::string& path) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      absl::StrCat("cannot make the folder ", path, ": a file has this name; move it away"));
+      absl::StrCat("cannot create the folder ", path, ": a file has this name; move it"));
 }
 
 absl::Status SyncFolder(const std::string& path) {

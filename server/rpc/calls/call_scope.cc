@@ -138,10 +138,9 @@ absl::Status CallScope::Admit(grpc::CallbackServerContext* context) {
       TF_RETURN_IF_ERROR(gate_->checks().may_call(principal(), method_));
   }
   if (kind_ != CallKind::kMetadata && gate_->draining()) {
-    return WithReason(
-        absl::UnavailableError(
-            "the server is draining and takes no new work; try another one, or again in a minute"),
-        ErrorReason::kServerDraining);
+    return WithReason(absl::UnavailableError("the server is draining and accepts no new work; use "
+                                             "another server, or try again in a minute"),
+                      ErrorReason::kServerDraining);
   }
   if (gate_->checks().observer != nullptr)
     TF_RETURN_IF_ERROR(gate_->checks().observer->OnBegin(Observed()));
@@ -185,7 +184,7 @@ absl::Status CallScope::Renew(const std::string& token) {
                       gate_->checks().authenticator->Authenticate({.authorization = {bearer}}));
   if (*renewed.principal != principal()) {
     return absl::UnauthenticatedError(
-        "the new token is another's, or allows something else; open another stream with it");
+        "the new token has another principal or other rights; open a new stream with it");
   }
   authenticated_ = std::move(renewed);
   return absl::OkStatus();
@@ -210,8 +209,8 @@ void CallScope::SetResource(std::string resource) {
 
 CallScope::~CallScope() {
   if (gate_ == nullptr) return;
-  spdlog::warn("{} was left without an outcome, request {}", method_, request_id_);
-  TellEnd(absl::CancelledError("left without an outcome"));
+  spdlog::warn("{} ended without an outcome, request {}", method_, request_id_);
+  TellEnd(absl::CancelledError("ended without an outcome"));
   gate_->Leave();
 }
 

@@ -65,7 +65,7 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
     if (ok) {
       WriteNext();
     } else {
-      End(absl::CancelledError("the client has cancelled the call, or took no message in time"));
+      End(absl::CancelledError("the client canceled the call, or read no message in time"));
     }
   }
 

@@ -16,8 +16,8 @@ namespace {
 
 absl::Status TooManyWatches(int limit, absl::string_view what, absl::string_view option) {
   return WithReason(
-      absl::ResourceExhaustedError(absl::StrCat(what, " has ", limit, " watches, as many as it may",
-                                                "; close one or raise ", option)),
+      absl::ResourceExhaustedError(absl::StrCat(
+          what, " has ", limit, " watches, which is the limit", "; close one or raise ", option)),
       ErrorReason::kTooManyWatches, {{"limit", absl::StrCat(limit)}});
 }
 
@@ -88,7 +88,7 @@ absl::Status SessionWatches::Acknowledge(const std::string& watch, uint64_t numb
     return found->second.watcher->Acknowledge(number, by);
   }
   return WithReason(absl::NotFoundError(absl::StrCat("no watch \"watches/", watch,
-                                                     "\": it has ended; begin another one")),
+                                                     "\": it has ended; begin a new one")),
                     ErrorReason::kWatchNotFound);
 }
 
@@ -128,7 +128,7 @@ void SessionWatches::NotifyDraining(std::chrono::system_clock::time_point end) {
     if (channel == nullptr) continue;
     channel->Tell(notice);
     channel->EndWithDrags(
-        WithReason(absl::UnavailableError("the server is draining, and nobody drags any longer; "
+        WithReason(absl::UnavailableError("the server is draining, and no drag is open; "
                                           "watch again in a minute"),
                    ErrorReason::kServerDraining));
   }

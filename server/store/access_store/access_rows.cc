@@ -16,7 +16,7 @@ absl::Status ParseInto(absl::string_view bytes, Message* message) {
   if (message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
     return absl::OkStatus();
   }
-  return Damaged("a row of who may do what", "its bytes are none");
+  return Damaged("an access right", "it is unreadable");
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ absl::Status ParseRow(absl::string_view bytes, ShareRow* row) {
   if (const absl::Status status = ParseInto(bytes, &proto); !status.ok()) return status;
   if (proto.role() != static_cast<int32_t>(ShareRole::kViewer) &&
       proto.role() != static_cast<int32_t>(ShareRole::kPlanner)) {
-    return Damaged("a share", "its role is none");
+    return Damaged("a share", "its role is unknown");
   }
   *row = {.resource = proto.resource(),
           .owner = proto.owner(),

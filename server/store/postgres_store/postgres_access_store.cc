@@ -61,11 +61,11 @@ absl::StatusOr<Row> FindRow(PostgresPool* pool, const char* select, const Row& w
   const std::string key = KeyOf(wanted);
   return AskPool<Row>(pool, [&](PostgresTransaction& transaction) -> absl::StatusOr<Row> {
     TF_ASSIGN_OR_RETURN(const PostgresRows rows, transaction.Query(select, {key}));
-    if (rows.empty()) return absl::NotFoundError("no such row of who may do what");
+    if (rows.empty()) return absl::NotFoundError("no such access right");
     TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(rows.Text(0, 0)));
     Row row;
     TF_RETURN_IF_ERROR(ParseRow(bytes, &row));
-    if (KeyOf(row) != key) return absl::DataLossError("a row of who may do what is another's");
+    if (KeyOf(row) != key) return absl::DataLossError("an access right is another's");
     return row;
   });
 }

@@ -99,13 +99,13 @@ absl::Status ReadBlob(PostgresTransaction& transaction, const std::string& sha25
       return BadBlob(sha256, absl::StrCat("piece ", number, " has another size"));
     }
     if (Sha256Hex({piece}) != rows.Text(0, 0)) {
-      return BadBlob(sha256, absl::StrCat("piece ", number, " has other bytes than were written"));
+      return BadBlob(sha256, absl::StrCat("piece ", number, " has changed bytes"));
     }
     digest.Add(piece);
     TF_RETURN_IF_ERROR(sink(piece));
   }
   if (digest.Hex() == sha256) return absl::OkStatus();
-  return BadBlob(sha256, "its bytes have another SHA-256 than its name");
+  return BadBlob(sha256, "its SHA-256 does not match its name");
 }
 
 absl::Status RemoveUnclaimedBlob(PostgresTransaction& transaction, const std::string& sha256) {

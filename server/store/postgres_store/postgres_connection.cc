@@ -174,9 +174,10 @@ absl::Status PostgresConnection::Transact(
     return HidingDatabase(
         absl::UnavailableError(absl::StrCat(
             "database ", library_->name,
-            ": the connection was lost during a commit, which may have been kept; look before you "
+            ": the connection was lost during a commit, which may have succeeded; check before you "
             "try again")),
-        "the server's database was lost while this was kept, and it may have been; look before you "
+        "the server lost its database during the commit, which may have succeeded; check before "
+        "you "
         "try again");
   } catch (...) {
     return fail(FailureOfCaught(library_->name));

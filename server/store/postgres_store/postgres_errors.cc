@@ -28,15 +28,15 @@ std::string FirstLine(absl::string_view text) {
   return std::string(absl::StripAsciiWhitespace(line));
 }
 
-constexpr char kSameRows[] = "others change the same things at this moment; try again";
+constexpr char kSameRows[] = "concurrent changes; try again";
 
 absl::Status Told(StatusCode code, const std::string& name, absl::string_view what,
                   absl::string_view sentence = "") {
   return HidingDatabase(absl::Status(code, absl::StrCat("database ", name, ": ", what)), sentence);
 }
 
-constexpr char kReadOnly[] = "it is a read-only replica; name the primary (target_session_attrs)";
-constexpr char kNoChanges[] = "the server's database takes no changes now; try again in a minute";
+constexpr char kReadOnly[] = "it is a read-only replica; use the primary (target_session_attrs)";
+constexpr char kNoChanges[] = "the server's database is read-only now; try again in a minute";
 
 constexpr char kSameRowsUrl[] = "type.tissueform/OthersHoldRows";
 
@@ -47,7 +47,7 @@ absl::Status HeldByOthers(const std::string& name, absl::string_view what) {
 }
 
 PostgresFailure SameRows(const std::string& name) {
-  constexpr char kWhat[] = "others write the same rows; try again";
+  constexpr char kWhat[] = "concurrent writes to the same rows; try again";
   return {.status = HeldByOthers(name, kWhat), .transient = true};
 }
 
@@ -61,7 +61,7 @@ PostgresFailure LostConnection(const std::string& name, const std::exception& er
 PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error) {
   const std::string& state = error.sqlstate();
   if (state == "53100") {
-    return {Told(StatusCode::kResourceExhausted, name, "its disk is full; make room there")};
+    return {Told(StatusCode::kResourceExhausted, name, "its disk is full; free some space")};
   }
   if (state == "25006") {
     // Where a failover has made a replica of what was the primary another connection may find it.
@@ -70,15 +70,15 @@ PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error)
             .connected = false};
   }
   if (state == "22021") {
-    return {absl::InvalidArgumentError("a name holds bytes that are no text in UTF-8")};
+    return {absl::InvalidArgumentError("a name is not UTF-8")};
   }
   if (state == "40001" || state == "40P01") return SameRows(name);
   if (state == "55P03") {
-    return {HeldByOthers(name, "others hold the same rows for too long; try again")};
+    return {HeldByOthers(name, "the rows are locked for too long; try again")};
   }
   if (state == "57014") {
-    return {
-        Told(StatusCode::kUnavailable, name, "a statement took too long and was ended; try again")};
+    return {Told(StatusCode::kUnavailable, name,
+                 "a statement took too long and was canceled; try again")};
   }
   if (absl::StartsWith(state, "08") || absl::StartsWith(state, "57P") || state == "53300" ||
       state == "25P03") {
@@ -122,7 +122,7 @@ absl::Status ConnectError(const std::string& name, absl::string_view what) {
   if (absl::StrContains(what, "password authentication failed") ||
       absl::StrContains(what, "no password supplied")) {
     return Told(StatusCode::kFailedPrecondition, name,
-                "it refuses the user or the password; mend its address or the password file");
+                "it refuses the user or the password; correct its address or the password file");
   }
   // libpq tells of every address that it has tried; the last words of the first are the reason.
   return Told(StatusCode::kUnavailable, name, FirstLine(what));

@@ -50,7 +50,7 @@ absl::StatusOr<MeshPayload> ReadMeshBlob(PostgresTransaction& transaction,
         return absl::OkStatus();
       }));
   if (head == text) return payload;
-  return Damaged(absl::StrCat("mesh ", record.sha256), "its bytes are another mesh's");
+  return Damaged(absl::StrCat("mesh ", record.sha256), "its bytes belong to another mesh");
 }
 
 // No session of it is begun until the transaction's end.

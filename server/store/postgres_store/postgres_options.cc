@@ -37,7 +37,7 @@ constexpr int64_t kMaxPasswordBytes = 4096;
 absl::StatusOr<Keywords> ParseUrl(const std::string& url) {
   if (!absl::StartsWith(url, "postgresql://") && !absl::StartsWith(url, "postgres://")) {
     return absl::InvalidArgumentError(
-        "the store's address is no URL of a database; it reads "
+        "the store's address is not a database URL; the form is "
         "postgresql://user@host:port/name");
   }
   // What libpq would say of a bad URL holds parts of it: perhaps a password.
@@ -45,7 +45,7 @@ absl::StatusOr<Keywords> ParseUrl(const std::string& url) {
       PQconninfoParse(url.c_str(), nullptr), &PQconninfoFree);
   if (parsed == nullptr) {
     return absl::InvalidArgumentError(
-        "the store's address cannot be read; it reads "
+        "the store's address is invalid; the form is "
         "postgresql://user@host:port/name?sslmode=verify-full");
   }
   Keywords keywords;
@@ -69,12 +69,12 @@ absl::Status ChooseEncryption(Keywords* keywords) {
   std::string& mode = (*keywords)["sslmode"];
   if (mode == "allow" || mode == "prefer") {
     return absl::InvalidArgumentError(
-        absl::StrCat("sslmode=", mode, " may encrypt or not; say verify-full, require or disable"));
+        absl::StrCat("sslmode=", mode, " may be unencrypted; use verify-full, require or disable"));
   }
   // What libpq would find out only when it connects, as if the database were away.
   const std::set<absl::string_view> known = {"", "disable", "require", "verify-ca", "verify-full"};
   if (!known.contains(mode)) {
-    return absl::InvalidArgumentError("no such sslmode; say verify-full, require or disable");
+    return absl::InvalidArgumentError("unknown sslmode; use verify-full, require or disable");
   }
   const std::string& host =
       keywords->contains("hostaddr") ? (*keywords)["hostaddr"] : (*keywords)["host"];
@@ -117,7 +117,8 @@ absl::StatusOr<PostgresTarget> TargetOf(const PostgresOptions& options) {
   TF_ASSIGN_OR_RETURN(Keywords keywords, ParseUrl(options.url));
   if (keywords.contains("password")) {
     return absl::InvalidArgumentError(
-        "the store's address holds a password, which others can read; keep it in a file or in "
+        "the store's address contains a password, which other users can read; put it in a file or "
+        "in "
         "TISSUEFORM_STORE_PASSWORD");
   }
   TF_RETURN_IF_ERROR(ChooseEncryption(&keywords));
@@ -142,7 +143,7 @@ absl::StatusOr<std::string> ReadPostgresPassword(const std::string& file) {
   struct stat status {};
   if (fstat(opened.descriptor(), &status) != 0 || (status.st_mode & S_IRWXO) != 0) {
     return absl::FailedPreconditionError(
-        absl::StrCat("password file ", file, ": anybody may read it; chmod o-rwx it"));
+        absl::StrCat("password file ", file, ": other users can read it; chmod o-rwx it"));
   }
   TF_ASSIGN_OR_RETURN(std::string password, opened.ReadAt(0, kMaxPasswordBytes));
   return std::string(absl::StripSuffix(absl::StripSuffix(password, "\n"), "\r"));

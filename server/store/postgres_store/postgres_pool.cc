@@ -36,12 +36,12 @@ absl::Status CheckDatabase(const std::string& name, PostgresTransaction& transac
   };
   // Where the address has chosen one by its target_session_attrs.
   if (rows.Text(0, 0) == "true") {
-    return refused("it is a read-only replica; name the primary (target_session_attrs)");
+    return refused("it is a read-only replica; use the primary (target_session_attrs)");
   }
-  if (rows.Text(0, 1) != "UTF8") return refused("its encoding is not UTF8; make one that is");
+  if (rows.Text(0, 1) != "UTF8") return refused("its encoding is not UTF8; create one with UTF8");
   if (rows.Text(0, 2) == "off") {
     return refused(
-        "it answers before it has written (synchronous_commit=off), so that what is acknowledged "
+        "it answers before it writes (synchronous_commit=off), so that acknowledged data "
         "may be lost; set it to on");
   }
   return absl::OkStatus();

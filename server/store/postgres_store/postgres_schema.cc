@@ -124,8 +124,8 @@ absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transact
   TF_ASSIGN_OR_RETURN(const int64_t version, PostgresSchemaVersion(transaction));
   if (version > kSchemaVersion) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "database ", name, " has been written by a newer server (version ", version,
-        ", this one knows ", kSchemaVersion, "); start that one, or name another database"));
+        "database ", name, " was written by a newer server (version ", version, ", this one knows ",
+        kSchemaVersion, "); start the newer server, or name another database"));
   }
   if (version == kSchemaVersion) return absl::OkStatus();
   if (version < 4) TF_RETURN_IF_ERROR(transaction.Execute(kTablesOfVersion4));

@@ -98,7 +98,7 @@ TEST_F(LostAnswerTest, WhatIsLostForEverIsAnError) {
   meshes_.lost = 1000;
   options_.give_up_after = std::chrono::milliseconds(200);
   EXPECT_THAT(client_->UploadMesh(SingleTet(), {}, options_),
-              StatusIs(absl::StatusCode::kUnavailable, ::testing::HasSubstr("lost on the way")));
+              StatusIs(absl::StatusCode::kUnavailable, ::testing::HasSubstr("lost in transit")));
 }
 
 }  // namespace

@@ -375,7 +375,7 @@ TEST_F(GatewaySocketTest, CallsBeyondTheChannelsAreRefusedByName) {
   ASSERT_TRUE(Becomes([&] { return server_.open == 1; }));
   RawSocket second(port());
   second.Start(kSilent);
-  ExpectRefused(&second, 8, "as many as it may", 1000, GatewayEvent::kNoCallSlot);
+  ExpectRefused(&second, 8, "which is the limit", 1000, GatewayEvent::kNoCallSlot);
 }
 
 TEST_F(GatewaySocketTest, OtherSubprotocolsAreRefused) {

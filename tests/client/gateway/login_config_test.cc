@@ -36,7 +36,7 @@ TEST(LoginConfig, IssuersAreHttpsOrOnLoopback) {
 TEST(LoginConfig, AnIssuerForEveryTenantIsRefusedByItsName) {
   EXPECT_THAT(
       CheckLoginConfig({.issuer = "https://login.example.org/{tenantid}/v2.0", .client_id = "a"}),
-      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("put your tenant's id in its place")));
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("replace it with your tenant's id")));
 }
 
 TEST(LoginConfig, IssuerAndClientIdBelongTogether) {

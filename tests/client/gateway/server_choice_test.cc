@@ -56,13 +56,13 @@ TEST_P(BadServersTest, AreRefusedByName) {
 
 INSTANTIATE_TEST_SUITE_P(
     Servers, BadServersTest,
-    ::testing::Values(BadServers{"NoAddress", {"a="}, "no address"},
-                      BadServers{"Nothing", {""}, "no address"},
+    ::testing::Values(BadServers{"NoAddress", {"a="}, "not an address"},
+                      BadServers{"Nothing", {""}, "not an address"},
                       BadServers{"NoPort", {"a=h"}, "give HOST:PORT"},
                       BadServers{"PortBeyondAll", {"h:99999"}, "give HOST:PORT"},
                       BadServers{"Space", {"a b=h:1"}, "letters"},
                       BadServers{"LongName", {std::string(65, 'n') + "=h:1"}, "64"},
-                      BadServers{"TwoOfOneName", {"a=h:1", "a=h:2"}, "another server"}),
+                      BadServers{"TwoOfOneName", {"a=h:1", "a=h:2"}, "duplicate name"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(ServerChoice, TakesNamesAsServersHaveThem) {

@@ -160,9 +160,9 @@ TEST(BadPlanTest, WhatIsNoJsonIsRefusedWithItsPlace) {
 
 TEST(BadPlanTest, KeyThatStandsTwiceIsRefused) {
   EXPECT_THAT(ParseText(R"({"unit": "mm", "unit": "cm"})"),
-              IsRefused("\"unit\" stands twice at /"));
+              IsRefused("\"unit\" appears twice at /"));
   EXPECT_THAT(ParseText(R"({"handles": [1, {"pose": {"scale": 1, "scale": 2}}]})"),
-              IsRefused("\"scale\" stands twice at /handles/1/pose"));
+              IsRefused("\"scale\" appears twice at /handles/1/pose"));
 }
 
 TEST(BadPlanTest, DeepNestingIsRefused) {

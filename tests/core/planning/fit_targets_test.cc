@@ -133,11 +133,11 @@ TEST(FitTargetsTest, MistakesAreNamedInOneLine) {
   refused(With("/targets/0/weight", 0), "/targets/0/weight");
   refused(With("/free/0/translation_mm/1", {3, -2}), "bounds of its translation along y cross");
   refused(With("/free/0/translation_mm", {{1, 2}}), "/free/0/translation_mm");
-  refused(With("/coordinate_system", "RAS"), "its coordinate_system is RAS and the plan's is LPS");
+  refused(With("/coordinate_system", "RAS"), "its coordinate_system is RAS but the plan's is LPS");
   refused(With("/targets/0/at/place", "chin"), "/targets/0/at");
   refused(With("/targets/0/at/foremost", true), "/targets/0/at");
   refused(With("/targets/0/by_mm", 3), "along and by_mm belong together");
-  refused(With("/targets/0/to_mm", {1, 2, 3}), "what is wanted in one way");
+  refused(With("/targets/0/to_mm", {1, 2, 3}), "it must have one goal");
   refused(With("/targets/0/at", {{"box_mm", {{"min", {3, 3, 7}}, {"max", {5, 5, 9}}}}}),
           "\"at\" selects no vertex of the surface");
   refused(With("/targets/0/at", {{"vertices", {9999}}}), "\"at\"");

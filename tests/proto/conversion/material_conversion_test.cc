@@ -37,7 +37,7 @@ TEST(MaterialConversionTest, RangesThatAreNoneAreRefused) {
   const v1::MaterialRanges good = ToProto(Ranges());
   v1::MaterialRanges bad = good;
   bad.set_tissues(std::string(2, '\0'));
-  refused(bad, "ranges.tissues has 2 bytes; it must be one a tet, 3");
+  refused(bad, "ranges.tissues has 2 bytes; it must be one per tet, 3");
   bad.set_tissues(std::string("\0\1\2", 3));
   refused(bad, "gives tet 2 the tissue 2, but there are 2 factors");
   bad.set_tissues(std::string("\0\1\xff", 3));

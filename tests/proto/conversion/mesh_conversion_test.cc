@@ -25,7 +25,7 @@ TEST(MeshConversionTest, NamesAreStrict) {
   ASSERT_OK_AND_ASSIGN(const std::string parsed, ParseMeshName("meshes/" + digest));
   EXPECT_EQ(parsed, digest);
   for (const std::string name : {"", "meshes/", "meshes/abc", "sessions/abc"}) {
-    EXPECT_THAT(ParseMeshName(name), StatusIs(kInvalid, HasSubstr("name of a mesh")));
+    EXPECT_THAT(ParseMeshName(name), StatusIs(kInvalid, HasSubstr("invalid mesh name")));
   }
   EXPECT_THAT(ParseMeshName("meshes/" + std::string(64, 'A')),
               StatusIs(kInvalid, HasSubstr("mesh")));

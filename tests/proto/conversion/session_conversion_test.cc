@@ -25,7 +25,7 @@ TEST(SessionConversionTest, NamesAreStrict) {
   ASSERT_OK_AND_ASSIGN(const std::string id, ParseSessionName("sessions/0aZ"));
   EXPECT_EQ(id, "0aZ");
   for (const std::string name : {"", "sessions/", "sessions/a/b", "sessions/a b", "0aZ"}) {
-    EXPECT_THAT(ParseSessionName(name), StatusIs(kInvalid, HasSubstr("name of a session")));
+    EXPECT_THAT(ParseSessionName(name), StatusIs(kInvalid, HasSubstr("invalid session name")));
   }
   EXPECT_FALSE(ParseSessionName("sessions/" + std::string(65, 'a')).ok());
 }

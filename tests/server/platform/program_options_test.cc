@@ -138,7 +138,7 @@ INSTANTIATE_TEST_SUITE_P(
     , BadFileTest,
     ::testing::Values(BadFile{"UnknownOption", "prot = 1\n", ".ini: there is no option \"prot\""},
                       BadFile{"ATokenInItsPlace", "eyJhbGciOiJFUzI1NiJ9.eyJzdWIiOiJhIn0.c2ln\n",
-                              ".ini: it is no file of options"},
+                              ".ini: it is not a file of options"},
                       BadFile{"Section", "[server]\nport = 1\n", "section [server]"},
                       BadFile{"AnotherFile", "config = /x.ini\n", "no option \"config\""},
                       BadFile{"OutOfRange", "port = 12\n", "--port"},

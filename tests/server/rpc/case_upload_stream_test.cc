@@ -165,7 +165,7 @@ TEST_F(CaseUploadStreamTest, WhatIsNoUploadIsRefused) {
   refused({v1::UploadCaseRequest()}, Code::INVALID_ARGUMENT, "header");
   refused({Chunk(0, 10)}, Code::INVALID_ARGUMENT, "header");
   refused({header, header}, Code::INVALID_ARGUMENT, "only chunks");
-  refused({header, Chunk(10, 10)}, Code::INVALID_ARGUMENT, "go on there");
+  refused({header, Chunk(10, 10)}, Code::INVALID_ARGUMENT, "continue there");
   refused({header, Chunk(0, 5'000), Chunk(0, 5'000)}, Code::INVALID_ARGUMENT, "5000 bytes");
   refused({header, Chunk(0, 5'000, true)}, Code::INVALID_ARGUMENT, "send all");
   v1::UploadCaseRequest beyond = Chunk(9'000, 1'000, true);
@@ -173,7 +173,7 @@ TEST_F(CaseUploadStreamTest, WhatIsNoUploadIsRefused) {
   refused({header, Chunk(0, 9'000), beyond}, Code::INVALID_ARGUMENT, "ends at 10000");
   v1::UploadCaseRequest flipped = Chunk(0, 10'000, true);
   (*flipped.mutable_chunk()->mutable_data())[77] ^= 1;
-  refused({header, flipped}, Code::DATA_LOSS, "damaged on their way");
+  refused({header, flipped}, Code::DATA_LOSS, "damaged in transit");
   v1::UploadCaseRequest large = Chunk(0, 1);
   large.mutable_chunk()->mutable_data()->resize((1 << 20) + 1);
   refused({header, large}, Code::INVALID_ARGUMENT, "1048576");

@@ -245,9 +245,8 @@ TEST_F(WatchTest, ASlowWatchIsSentTheNewestFrameOnlyAndSlowsNobody) {
   EXPECT_TRUE(slow->Receive()->has_form());
   // `quick` may have been shown the last frame before `slow`.
   EXPECT_GE(slow->Receive()->frame().frame().sequence(), kLast - 1);
-  EXPECT_THAT(
-      watches_.Acknowledge(id, 1'000'000),
-      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the last one that was sent")));
+  EXPECT_THAT(watches_.Acknowledge(id, 1'000'000),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the last frame sent")));
   EndDrag(std::move(drag));
   slow->Cancel();
   quick->Cancel();

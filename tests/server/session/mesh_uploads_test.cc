@@ -121,12 +121,13 @@ TEST_F(MeshUploadsTest, ChunksOutOfPlaceAreRefusedAndNothingIsLost) {
                 StatusIs(Code::kInvalidArgument, HasSubstr(text)));
     EXPECT_EQ(Committed(), 1000) << text;
   };
-  refused(999, "x", false, "1000 bytes of this mesh are there; go on there, or begin anew at 0");
+  refused(999, "x", false,
+          "1000 bytes of this mesh are there; continue there, or start again at 0");
   refused(1001, "x", false, "begins at 1001");
   refused(-8, "x", false, "begins at -8");
   refused(INT64_MAX, "x", false, "1000 bytes");
-  refused(1000, payload_.substr(999), true, "past the end");
-  refused(0, payload_ + "x", true, "past the end");
+  refused(1000, payload_.substr(999), true, "exceeds");
+  refused(0, payload_ + "x", true, "exceeds");
   refused(1000, std::string((1 << 20) + 1, 'x'), false, "1048576 at most");
   refused(1000, "", true, "send the rest");
   const absl::Status out_of_place = Open()->Write(7, "x", false);
@@ -148,7 +149,7 @@ TEST_F(MeshUploadsTest, ASecondUploadOfTheMeshIsRefusedAsLongAsTheFirstLives) {
   EXPECT_THAT(second, StatusIs(Code::kAborted, HasSubstr("another client")));
   EXPECT_TRUE(HasReason(second, ErrorReason::kUploadUnderWay));
   const SampleMesh other(Bar({2, 2, 4}));
-  EXPECT_THAT(uploads_->Open(other.Announcement()), IsOk()) << "of another mesh";
+  EXPECT_THAT(uploads_->Open(other.Announcement()), IsOk()) << "to another mesh";
   ASSERT_THAT(first->Write(0, payload_.substr(0, 10), false), IsOk());
   first.reset();
   EXPECT_EQ(Open()->received_bytes(), 10);
@@ -222,7 +223,7 @@ TEST_F(MeshUploadsTest, OverTheStoresLimitsWhatCameBeforeStays) {
     EXPECT_THAT(upload->Write(1000, payload_.substr(1000, 1000), false),
                 StatusIs(Code::kResourceExhausted, HasSubstr("1500 bytes")));
     EXPECT_THAT(uploads_->Open(SampleMesh(Bar({2, 2, 4})).Announcement()),
-                StatusIs(Code::kResourceExhausted, HasSubstr("partly uploaded")));
+                StatusIs(Code::kResourceExhausted, HasSubstr("incomplete mesh uploads")));
   }
   EXPECT_EQ(Committed(), 1000);
 }

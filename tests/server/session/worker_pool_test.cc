@@ -52,7 +52,8 @@ TEST(WorkerPoolTest, NoLaneWaitsForAnother) {
       if (lane == busy) continue;
       std::promise<void> ran;
       pool.Post(static_cast<Lane>(lane), [&ran] { ran.set_value(); });
-      ran.get_future().wait();
+      EXPECT_EQ(ran.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready)
+          << "lane " << lane << " waits for lane " << busy;
     }
     end.set_value();
   }

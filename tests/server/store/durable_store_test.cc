@@ -342,7 +342,7 @@ TEST_F(DurableStoreTest, WhatIsNoDatabaseIsRefusedAndLeftAsItIs) {
   store_.reset();
   const std::string file = path_ + "/tissueform.db";
   std::ofstream(file, std::ios::trunc) << std::string(10000, 'x');
-  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss, HasSubstr("put a backup in place")));
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kDataLoss, HasSubstr("restore a backup")));
   EXPECT_EQ(ReadFile(file), std::string(10000, 'x'));
   EXPECT_EQ(Blobs(), 2U) << "nothing was removed";
 }
@@ -353,8 +353,8 @@ TEST_F(DurableStoreTest, AStoreOfANewerServerOrAnotherProgramIsRefused) {
   Sql("PRAGMA user_version=99");
   EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("newer server")));
   Sql("PRAGMA user_version=5; PRAGMA application_id=7");
-  EXPECT_THAT(Open(),
-              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not one of tissueform")));
+  EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition,
+                               HasSubstr("does not belong to tissueform")));
   Sql("PRAGMA application_id=" + absl::StrCat(0x54697346));
   ASSERT_THAT(Open(), IsOk());
   ExpectSession(0);

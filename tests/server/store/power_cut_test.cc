@@ -260,7 +260,7 @@ TEST(BrokenDiskTest, NothingIsAcknowledgedThatCouldNotBeSynced) {
   EXPECT_FALSE(uploads.Committed(announcement.sha256).ok());
   BreakSyncs(path, false);
   EXPECT_THAT(uploads.Committed(announcement.sha256),
-              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("begin it anew")))
+              StatusIs(absl::StatusCode::kDataLoss, HasSubstr("start it again")))
       << "a later sync says nothing of what the first has lost";
   ASSERT_OK_AND_ASSIGN(const int64_t committed, uploads.Begin(announcement));
   EXPECT_EQ(committed, 0);

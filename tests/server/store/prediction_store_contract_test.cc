@@ -62,9 +62,9 @@ TEST_P(PredictionStoreContractTest, WhatDoesNotFitIsRefused) {
   EXPECT_THAT(store_->Create(SamplePrediction(""), SamplePositions(1)),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("id")));
   EXPECT_THAT(store_->Create(SamplePrediction("p"), SamplePositions(1, 39)),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("12 a vertex")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("12 per vertex")));
   EXPECT_THAT(store_->Create(SamplePrediction("p"), SamplePositions(1) + "x"),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("12 a vertex")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("12 per vertex")));
   ASSERT_THAT(store_->Create(SamplePrediction("p"), SamplePositions(1)), IsOk());
   EXPECT_THAT(store_->Create(SamplePrediction("p", "other"), SamplePositions(2)),
               StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("p")));

@@ -110,9 +110,9 @@ TEST(SessionRecordTest, WhatDoesNotAgreeWithItselfIsDamaged) {
   damaged([](SessionRecord& record) { record.mesh_sha256 = "A"; }, "mesh");
   damaged([](SessionRecord& record) { record.last_poses.pop_back(); }, "1 poses for 2 handles");
   damaged([](SessionRecord& record) { record.last_poses[1].scale = -1; }, "pose 1");
-  damaged([](SessionRecord& record) { record.node_order[0] = 1; }, "no permutation");
-  damaged([](SessionRecord& record) { record.node_order[0] = 3; }, "no permutation");
-  damaged([](SessionRecord& record) { record.node_order[0] = -1; }, "no permutation");
+  damaged([](SessionRecord& record) { record.node_order[0] = 1; }, "not a permutation");
+  damaged([](SessionRecord& record) { record.node_order[0] = 3; }, "not a permutation");
+  damaged([](SessionRecord& record) { record.node_order[0] = -1; }, "not a permutation");
 }
 
 TEST(SessionRecordTest, PosesAloneSurviveTheirBytes) {

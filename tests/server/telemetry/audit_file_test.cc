@@ -222,7 +222,7 @@ TEST_F(AuditFileTest, OfALineThatDoesNotFitOnTheDiskNothingIsLeft) {
 TEST_F(AuditFileTest, WhereNothingCanBeWrittenTheLogDoesNotOpen) {
   options_.path = "/dev/full";
   EXPECT_THAT(AuditFile::Open(SampleKey(), options_),
-              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("no regular file")));
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("not a regular file")));
   options_.path = (folder_ / "none" / "audit.jsonl").string();
   EXPECT_THAT(AuditFile::Open(SampleKey(), options_),
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("none/audit.jsonl")));

@@ -80,7 +80,7 @@ export class SessionRoutes {
 
 const UNREACHED = new CallError(
   Code.FailedPrecondition,
-  "the server that has this session is not one of those that this page's gateway reaches; tell whoever runs them: the gateway needs a --server of its name",
+  "the gateway does not know the server of this session; tell the administrator that the gateway needs a --server with its name",
 );
 
 /** Metadata by which a proxy may send all calls of a session to one server. */

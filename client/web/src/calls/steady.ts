@@ -27,7 +27,7 @@ export async function* steady<T>(start: (signal: AbortSignal) => AsyncIterable<T
       stop = wait(PATIENCE_MS);
     }
   } catch (thrown) {
-    throw stalledMs === 0 ? thrown : new CallError(Code.Unavailable, `nothing has come from the server for ${stalledMs / 1000} s`);
+    throw stalledMs === 0 ? thrown : new CallError(Code.Unavailable, `no data from the server for ${stalledMs / 1000} s`);
   } finally {
     stop();
     ending.abort();

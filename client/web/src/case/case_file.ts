@@ -78,7 +78,7 @@ class Views {
   range(range: Range): ArrayBuffer {
     const begin = range.offset - this.offset;
     if (begin < 0 || begin + range.length > this.bytes.length) {
-      throw new CaseError("the case's mesh does not lie behind all else: make the file again by tissueform case pack");
+      throw new CaseError("the case's mesh is not at the end of the file: make the file again with tissueform case pack");
     }
     return this.bytes.buffer.slice(this.bytes.byteOffset + begin, this.bytes.byteOffset + begin + range.length);
   }
@@ -92,14 +92,14 @@ function checkPayload(manifest: Manifest, payload: Range): void {
   const { vertexCount, tetCount, cellArrays } = manifest.mesh;
   const expected = 24 * vertexCount + 16 * tetCount + 8 * tetCount * cellArrays.length;
   if (payload.length !== expected) {
-    throw new CaseError(`the case's mesh has ${payload.length} bytes, and its counts say ${expected}: make the file again by tissueform case pack`);
+    throw new CaseError(`the case's mesh has ${payload.length} bytes, and its counts say ${expected}: make the file again with tissueform case pack`);
   }
 }
 
 function build(source: CaseSource, manifest: Manifest, container: Container, views: Views, payload: Range): CaseFile {
   const raw = manifest.surfaces.map((entry) => readSurface(entry, manifest, container, views));
   const rest = new Float64Array(views.range({ offset: payload.offset, length: 24 * manifest.mesh.vertexCount }));
-  if (!rest.every(Number.isFinite)) throw new CaseError("the case's mesh has a position that is no number");
+  if (!rest.every(Number.isFinite)) throw new CaseError("the case's mesh has a position that is not a number");
   const restPositions = Float32Array.from(rest);
   const sessionRequest = parseMessage(() => readRequest(manifest, views), "session request");
   const probes = findProbes(manifest, sessionRequest, restPositions);
@@ -130,7 +130,7 @@ function readSurface(entry: SurfaceEntry, manifest: Manifest, container: Contain
   const positions = new Float32Array(views.range(ranges.positions));
   const triangles = new Uint32Array(views.range(ranges.triangles));
   const count = positions.length / 3;
-  if (!positions.every(Number.isFinite)) throw new CaseError(`the surface "${entry.name}" has a position that is no number`);
+  if (!positions.every(Number.isFinite)) throw new CaseError(`the surface "${entry.name}" has a position that is not a number`);
   if (!triangles.every((vertex) => vertex < count)) throw new CaseError(`the surface "${entry.name}" has a triangle with a vertex past its ${count}`);
   const regions = entry.regions === null ? null : new Uint8Array(views.view(entry.regions));
   if (regions !== null && regions.length < count) throw new CaseError(`the surface "${entry.name}" has no region for each of its ${count} vertices`);
@@ -143,7 +143,7 @@ function readFollows(entry: SurfaceEntry, manifest: Manifest, views: Views, coun
   const vertexBytes = views.view(entry.follows.vertices);
   const weightBytes = views.view(entry.follows.weights);
   if (vertexBytes.byteLength !== expectedBytes || weightBytes.byteLength !== expectedBytes) {
-    throw new CaseError(`what the surface "${entry.name}" follows is not three vertices and three weights for each of its ${count} vertices`);
+    throw new CaseError(`the surface "${entry.name}" needs three vertices and three weights for each of its ${count} vertices`);
   }
   const vertices = new Int32Array(vertexBytes);
   const weights = new Float32Array(weightBytes);
@@ -179,7 +179,7 @@ function checkSkinVertices(manifest: Manifest, surfaces: CaseSurface[]): void {
   const count = skin === undefined ? 0 : skin.positions.length / 3;
   for (const landmark of manifest.landmarks) {
     if (landmark.skinVertex !== null && landmark.skinVertex >= count) {
-      throw new CaseError(`the landmark "${landmark.name}" lies on a vertex that the skin of ${count} vertices does not have`);
+      throw new CaseError(`the landmark "${landmark.name}" names a vertex that the skin of ${count} vertices does not have`);
     }
   }
 }
@@ -188,7 +188,7 @@ function readRequest(manifest: Manifest, views: Views): CreateSessionRequest {
   const request = fromBinary(CreateSessionRequestSchema, new Uint8Array(views.view(manifest.sessionRequest)));
   const names = request.handles.map((handle) => handle.name).sort().join("\n");
   if (request.mesh !== manifest.mesh.name || names !== manifest.handles.map((handle) => handle.name).sort().join("\n")) {
-    throw new CaseError("the case's session request is of another mesh or has other handles than the case");
+    throw new CaseError("the case's session request has another mesh or other handles than the case");
   }
   return request;
 }
@@ -204,6 +204,6 @@ function parseMessage<T>(parse: () => T, what: string): T {
     return parse();
   } catch (thrown) {
     if (thrown instanceof CaseError) throw thrown;
-    throw new CaseError(`the case's ${what} cannot be read: make the file again by tissueform case pack`);
+    throw new CaseError(`the case's ${what} cannot be read: make the file again with tissueform case pack`);
   }
 }

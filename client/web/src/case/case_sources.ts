@@ -17,7 +17,7 @@ export function fileSource(file: Blob): CaseSource {
     totalBytes: file.size,
     async read(offset, length, onBytes) {
       const bytes = new Uint8Array(await file.slice(offset, offset + length).arrayBuffer());
-      if (bytes.length !== length) throw new Error("the file has become shorter: drop it again");
+      if (bytes.length !== length) throw new Error("the file became shorter: drop it again");
       onBytes?.(length);
       return bytes;
     },
@@ -39,12 +39,12 @@ export function serverSource(gateway: { cases: Pick<Gateway["cases"], "readCase"
         try {
           const request = { name: entry.name, readOffset: BigInt(offset + done), readLimit: BigInt(length - done) };
           for await (const { data } of steady((signal) => gateway.cases.readCase(request, { timeoutMs: 0, signal }), { timer })) {
-            if (done + data.length > length) throw new Error("the server sent more of the case than it was asked for");
+            if (done + data.length > length) throw new Error("the server sent more of the case than requested");
             bytes.set(data, done);
             done += data.length;
             onBytes?.(done);
           }
-          if (done < length) throw new Error("the server sent less of the case than it was asked for");
+          if (done < length) throw new Error("the server sent less of the case than requested");
         } catch (thrown) {
           const error = toCallError(thrown);
           tries = done > before ? 0 : tries + 1;
@@ -74,6 +74,6 @@ export async function listCases(gateway: Gateway): Promise<Case[]> {
 
 /** In hexadecimal digits. Rejects with an Error on pages where browsers check no files. */
 export async function sha256Of(file: Blob): Promise<string> {
-  const digest = await subtleCrypto("checks files", "or publish the case by tissueform case publish").digest("SHA-256", await file.arrayBuffer());
+  const digest = await subtleCrypto("checks files", "or publish the case with tissueform case publish").digest("SHA-256", await file.arrayBuffer());
   return Array.from(new Uint8Array(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }

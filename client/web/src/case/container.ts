@@ -50,11 +50,11 @@ export function jsonRange(prefix: Uint8Array, totalBytes: number): Range {
   if (totalBytes > MAX_FILE_BYTES) throw new CaseError(`the file has ${totalBytes} bytes, and a case at most ${MAX_FILE_BYTES}`);
   const head = new DataView(prefix.buffer, prefix.byteOffset, prefix.byteLength);
   if (prefix.length < PREFIX_BYTES || head.getUint32(0, true) !== MAGIC) {
-    throw new CaseError("this is no case file: drop one that was made by tissueform case pack (.tfcase)");
+    throw new CaseError("this is not a case file: drop one made by tissueform case pack (.tfcase)");
   }
-  if (head.getUint32(4, true) !== 2) throw new CaseError("the file is of another glTF version than 2");
+  if (head.getUint32(4, true) !== 2) throw new CaseError("the file's glTF version is not 2");
   if (head.getUint32(8, true) !== totalBytes) {
-    throw new CaseError(`the file says that it has ${head.getUint32(8, true)} bytes, and has ${totalBytes}: copy it again`);
+    throw new CaseError(`the file states ${head.getUint32(8, true)} bytes and has ${totalBytes}: copy it again`);
   }
   const length = head.getUint32(12, true);
   if (head.getUint32(16, true) !== CHUNK_JSON) throw new CaseError("the file does not begin with JSON");
@@ -87,7 +87,7 @@ function binRange(jsonBytes: number, head: Uint8Array, totalBytes: number): Rang
   const view = new DataView(head.buffer, head.byteOffset, head.byteLength);
   const length = view.getUint32(0, true);
   if (view.getUint32(4, true) !== CHUNK_BIN || offset + length > totalBytes) {
-    throw new CaseError("the file's binary part is missing or cut off: copy the file again");
+    throw new CaseError("the file's binary part is missing or incomplete: copy the file again");
   }
   return { offset, length };
 }

@@ -78,6 +78,6 @@ export class Field {
   }
 
   fail(expected: string): never {
-    throw new CaseError(`the case's ${this.path === "" ? "JSON" : this.path} is not ${expected}: make the file again by tissueform case pack`);
+    throw new CaseError(`the case's ${this.path === "" ? "JSON" : this.path} is not ${expected}: make the file again with tissueform case pack`);
   }
 }

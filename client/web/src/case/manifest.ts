@@ -64,7 +64,7 @@ const MAX_COUNT = 2 ** 31 - 1;
 export function readManifest(root: Field, views: number, meshes: number): Manifest {
   root.get("format").oneOf(["tissueform-case"]);
   const version = root.get("version").integer(1, MAX_COUNT);
-  if (version > VERSION) throw new CaseError(`the case is of version ${version}, and this planner knows ${VERSION}: open it with a newer one`);
+  if (version > VERSION) throw new CaseError(`the case has version ${version}, and this planner knows ${VERSION}: open it with a newer one`);
   root.get("unit").oneOf(["mm"]);
   root.get("coordinate_system").oneOf(["LPS"]);
   const view = (field: Field) => field.integer(0, views - 1);

@@ -85,7 +85,7 @@ class Table extends Map<number, Entry> {
 /** Sections by their numbers; every one behind the one before it, the last one at the end. */
 function readTable(bytes: Uint8Array): Table {
   if (bytes.length < HEAD_BYTES || String.fromCharCode(...bytes.subarray(0, 8)) !== MAGIC) {
-    throw new AnswersError("the bytes do not begin as prepared answers do");
+    throw new AnswersError("these are not prepared answers");
   }
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const table = new Table();
@@ -104,7 +104,7 @@ function readTable(bytes: Uint8Array): Table {
     end = offset + size;
   }
   if (!isWhole || Math.ceil(end / ALIGNMENT) * ALIGNMENT !== bytes.length) {
-    throw new AnswersError("prepared answers are cut off or damaged; fetch them again");
+    throw new AnswersError("prepared answers are incomplete or damaged; fetch them again");
   }
   return table;
 }

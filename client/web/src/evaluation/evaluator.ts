@@ -20,7 +20,7 @@ export async function makeEvaluator(bytes: Uint8Array, options: EvaluatorOptions
   const { sha256, mostBytes = MOST_ANSWER_BYTES, kernel } = options;
   const isCompared = sha256 !== undefined && bytes.length <= mostBytes && globalThis.crypto?.subtle !== undefined;
   if (isCompared && (await sha256Of(bytes)) !== sha256.toLowerCase()) {
-    throw new AnswersError("prepared answers have another SHA-256 than was told; fetch them again");
+    throw new AnswersError("prepared answers do not match the announced SHA-256; fetch them again");
   }
   const answers = readAnswers(bytes, mostBytes);
   return new AnswerEvaluator(answers, kernel ?? (await webassemblyKernel(floatsOf(answers))) ?? javascriptKernel);

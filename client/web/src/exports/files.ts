@@ -44,7 +44,7 @@ function writeTriangle(view: DataView, at: number, positions: Float32Array, tria
   }
 }
 
-const BAND_REMARK = "band_95_mm: a vertex stays within this distance in 95 of 100 cases if nothing but the material is in doubt";
+const BAND_REMARK = "band_95_mm: 95 % interval of the vertex, material uncertainty only";
 
 /** Binary PLY of all surfaces as one, with comments: the notice first, then `remarks`; with the band where it is known of all. */
 export function toPly(surfaces: readonly ExportedSurface[], remarks: readonly string[]): Uint8Array<ArrayBuffer> {
@@ -100,7 +100,7 @@ export async function toPng(picture: HTMLCanvasElement, background: string, capt
   canvas.width = picture.width;
   canvas.height = picture.height;
   const context = canvas.getContext("2d");
-  if (context === null) throw new Error("this browser draws no pictures");
+  if (context === null) throw new Error("this browser cannot draw pictures");
   context.fillStyle = background;
   context.fillRect(0, 0, canvas.width, canvas.height);
   context.drawImage(picture, 0, 0);

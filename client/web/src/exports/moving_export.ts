@@ -56,15 +56,15 @@ async function showsPlan(data: MovingData): Promise<boolean> {
 /** `password`: "" for none. Rejects with an Error where the gateway does not have the page, and where the answers do not reach the plan. */
 export async function movingFile(file: CaseFile, plan: MovingPlan, password: string): Promise<Blob> {
   if (password !== "" && Array.from(password.normalize("NFC")).length < LEAST_PASSWORD_LETTERS) {
-    throw new Error(`a password of the file that moves has at least ${LEAST_PASSWORD_LETTERS} letters: better four words than one`);
+    throw new Error(`a password of the moving file needs at least ${LEAST_PASSWORD_LETTERS} letters: better four words than one`);
   }
   const data = movingDataOf(file, plan);
   if (!(await showsPlan(data))) {
     const other = plan.model === "linear_elastic" ? "Gradient field" : "Linear elastic";
-    throw new Error(`the plan moves bone further than the prepared answers of this model reach, so that the file would never show it: choose ${other}, or smaller moves`);
+    throw new Error(`the plan moves bone beyond the range of the prepared answers of this model reach, so the file could not show it: choose ${other}, or smaller moves`);
   }
   const reply = await fetch(new URL(TEMPLATE_FILE, document.baseURI));
-  if (!reply.ok) throw new Error(`the gateway does not have the page of files that move (${TEMPLATE_FILE}): build the planner anew by deploy/build_web.sh`);
+  if (!reply.ok) throw new Error(`the gateway does not have the page of moving files (${TEMPLATE_FILE}): build the planner again with deploy/build_web.sh`);
   const template = await reply.text();
   return new Blob([fillTemplate(template, await seal(writeMovingData(data), password))], { type: "text/html" });
 }

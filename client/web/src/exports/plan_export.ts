@@ -53,7 +53,7 @@ export function planDocument(bench: ToldPlan, ranges: PlannedRanges = null): str
   const byHandle = new Map(bench.plan.handles.map(({ name }, index) => [name, poses[index]]));
   const leftOut = [
     ...(bench.showsPlan ? [] : [`landmarks, measures and answer: ${NOT_THE_PLAN}`]),
-    ...(materialRanges !== null && ranges === null ? ["uncertainty: the stiffness does not tell the tissues of the case apart"] : []),
+    ...(materialRanges !== null && ranges === null ? ["uncertainty: the stiffness does not distinguish the tissues of the case"] : []),
   ];
   const document = {
     ...planOf(bench.file, byHandle, bench.modelInfo(bench.model.value)?.name ?? manifest.model, ranges),

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-/** A colour map as anchors at even distances, sRGB; between them it is linear. */
+/** A color map as anchors at even distances, sRGB; between them it is linear. */
 export interface ColorMap {
   name: string;
   anchors: readonly (readonly [number, number, number])[];
@@ -34,7 +34,7 @@ export function colorTable(map: ColorMap): Uint8Array {
   return table;
 }
 
-/** Three bytes for each value: 0 the first colour of `table`, `most` and beyond the last one. */
+/** Three bytes for each value: 0 the first color of `table`, `most` and beyond the last one. */
 export function colorize(values: Float32Array, most: number, table: Uint8Array, out: Uint8Array): void {
   const factor = most > 0 ? (TABLE_SIZE - 1) / most : 0;
   for (let i = 0; i < values.length; ++i) {

@@ -80,7 +80,7 @@ class Download {
       if (message.case === "chunk") this.take(Number(message.value.offset), message.value.data);
       if (this.sha256 === this.known && this.known !== "") return null;
     }
-    if (this.sha256 === "" || this.done !== this.bytes.length) throw new CallError(Code.Unavailable, "the columns were cut off");
+    if (this.sha256 === "" || this.done !== this.bytes.length) throw new CallError(Code.Unavailable, "the columns are incomplete");
     return { bytes: this.bytes, sha256: this.sha256 };
   }
 
@@ -95,7 +95,7 @@ class Download {
   }
 
   private take(offset: number, data: Uint8Array): void {
-    if (offset !== this.done || offset + data.length > this.bytes.length) throw new CallError(Code.DataLoss, "the columns do not follow each other");
+    if (offset !== this.done || offset + data.length > this.bytes.length) throw new CallError(Code.DataLoss, "the columns are not contiguous");
     this.bytes.set(data, offset);
     this.done += data.length;
     this.onProgress(this.done / this.bytes.length);

@@ -200,7 +200,7 @@ export class DragSession {
   private broken(error: CallError | null): void {
     if (this.isClosed) return;
     this.isStarted = false;
-    const cause = error ?? new CallError(Code.Unavailable, "the server has ended the drag");
+    const cause = error ?? new CallError(Code.Unavailable, "the server has stopped the drag");
     if (!cause.isPassing) {
       this.isClosed = true;
       this.unwatch();

@@ -113,7 +113,7 @@ export class FollowSession {
   private show(frame: WatchFrame, raw: Frame): void {
     if (frame.frame === undefined || this.form === null) return;
     if (this.form.encoding === PositionEncoding.INT16_ZSTD) {
-      throw new CallError(Code.Unimplemented, "who drags this session packs the frames, which this page cannot unpack: ask for another link");
+      throw new CallError(Code.Unimplemented, "this session's frames are compressed, and this page cannot unpack them: ask for another link");
     }
     const positions = asFloats(raw, frame.frame.positions);
     const watch = this.watch;
@@ -151,7 +151,7 @@ export class FollowSession {
   private broken(error: CallError | null): void {
     if (this.isClosed) return;
     this.stopWaiting?.();
-    const cause = error ?? new CallError(Code.Unavailable, "the server has ended the watch");
+    const cause = error ?? new CallError(Code.Unavailable, "the server has stopped the watch");
     if (!cause.isPassing) {
       this.isClosed = true;
       this.unwatch();

@@ -175,14 +175,14 @@ export class LiveSession {
   private dragEnded(error: CallError): void {
     this.hasUnkeptPoses = true;
     if (error.code === Code.NotFound) {
-      this.listener.onNotice("The server has lost the session; it is being made again.");
+      this.listener.onNotice("The server lost the session; it is being created again.");
       void this.connect(false);
     } else if (error.reason === "SESSION_UPDATED") void this.startAnew();
     else this.listener.onConnection({ kind: "failed", text: messageOf(error) });
   }
 
   private async startAnew(): Promise<void> {
-    this.listener.onNotice("Somebody has changed the session's segments; you go on in one of your own.");
+    this.listener.onNotice("Another user changed the session's segments; you continue in your own session.");
     this.session = await newSession(this.caseName);
     await this.connect(false);
   }
@@ -190,14 +190,14 @@ export class LiveSession {
   private tell({ notice }: DeformNotice): void {
     if (notice.case === "followers") this.listener.onFollowers(notice.value.count);
     // In a cluster another server goes on with it, of which the connection's state tells.
-    if (notice.case === "draining" && !this.gateway.routes.isCluster) this.listener.onNotice("The server is about to end. Your poses are kept; the page connects again by itself.");
-    if (notice.case === "evicted") this.listener.onNotice("The session had left the server's memory and is being prepared again.");
+    if (notice.case === "draining" && !this.gateway.routes.isCluster) this.listener.onNotice("The server is shutting down. Your poses are kept; the page reconnects automatically.");
+    if (notice.case === "evicted") this.listener.onNotice("The session was evicted from the server's memory and is being prepared again.");
     if (notice.case === "restored") this.listener.onNotice("The session is back in the server's memory.");
     if (notice.case === "updated") {
-      this.listener.onNotice("Somebody has updated the session: the face is that of the new one.");
+      this.listener.onNotice("The session was updated: the face shows the new one.");
       this.listener.onUpdated();
     }
-    if (notice.case === "committed" && notice.value.failure !== "") this.listener.onNotice(`The server could not keep the poses: ${messageOf(notice.value.failure)}`);
+    if (notice.case === "committed" && notice.value.failure !== "") this.listener.onNotice(`The server could not store the poses: ${messageOf(notice.value.failure)}`);
   }
 
   private async deleteAbandoned(): Promise<void> {

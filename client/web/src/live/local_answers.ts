@@ -136,7 +136,7 @@ export class LocalAnswers {
 
   private end(): void {
     this.drop();
-    this.listener.onState({ kind: "failed", text: "what computed beside it has ended." });
+    this.listener.onState({ kind: "failed", text: "the background worker stopped." });
   }
 
   private take(evaluation: Evaluation, number: number): void {

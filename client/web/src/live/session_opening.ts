@@ -21,7 +21,7 @@ const STAGES: Record<PreparationStage, string> = {
   [PreparationStage.ORDERING]: "Ordering the equations",
   [PreparationStage.FACTORISING]: "Factorising",
   [PreparationStage.RESPONSES]: "Preparing responses",
-  [PreparationStage.KEEPING]: "Keeping the session",
+  [PreparationStage.KEEPING]: "Storing the session",
   [PreparationStage.ANSWERS]: "Preparing answers",
 };
 
@@ -89,7 +89,7 @@ async function prepare(gateway: Gateway, session: string, request: PrepareSessio
     },
     { metadata: sessionMetadata(session) },
   );
-  if (result === null) throw new CallError(Code.DataLoss, "the server has prepared the session and has not told of it");
+  if (result === null) throw new CallError(Code.DataLoss, "the server prepared the session without reporting it");
   return result;
 }
 

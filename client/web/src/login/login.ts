@@ -93,7 +93,7 @@ export class Login {
   }
 
   private async arrive(answer: URLSearchParams, redirect: Redirect | null): Promise<void> {
-    if (redirect === null) return this.become({ kind: "out", problem: "This tab has begun no login. Sign in here." });
+    if (redirect === null) return this.become({ kind: "out", problem: "No login was started in this tab. Sign in here." });
     this.work = redirect.work ?? null;
     try {
       const { user, ...tokens } = await this.provider.exchange(answer, redirect, redirectUri(this.page));
@@ -141,7 +141,7 @@ export class Login {
 
   private async renewOnce(isReplacement: boolean): Promise<boolean> {
     const refreshToken = this.tokens?.refreshToken ?? null;
-    if (refreshToken === null) return this.runOut("The identity provider does not renew it here.", false);
+    if (refreshToken === null) return this.runOut("The identity provider does not renew it.", false);
     try {
       const tokens = await this.provider.renew(refreshToken);
       if (this.tokens === null) return false;

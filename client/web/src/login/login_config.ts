@@ -22,7 +22,7 @@ export async function fetchLoginConfig(base: string): Promise<LoginConfig | null
   }
   // Whatever serves the page in the gateway's place knows of no login.
   if (response.status === 404) return null;
-  if (!response.ok) throw new Error(`the gateway does not say how to log in (${response.status}): try again in a moment`);
+  if (!response.ok) throw new Error(`the gateway does not report how to log in (${response.status}): try again in a moment`);
   return readLoginConfig(await response.json().catch(() => undefined));
 }
 

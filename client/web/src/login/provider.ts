@@ -51,7 +51,7 @@ export class OidcProvider implements Provider {
 
   async authorizationUrl(redirect: Redirect, redirectUri: string): Promise<string> {
     const server = await this.discover();
-    const url = new URL(server.authorization_endpoint ?? fail("the identity provider names no place to log in"));
+    const url = new URL(server.authorization_endpoint ?? fail("the identity provider has no login address"));
     const parameters = {
       client_id: this.config.clientId,
       redirect_uri: redirectUri,
@@ -164,14 +164,14 @@ function differenceIn({ code, cause }: oauth.OperationProcessingError, issuer: s
   if (code === oauth.JWT_CLAIM_COMPARISON && claim === "iss") return otherIssuer(claims?.iss, String(expected ?? issuer));
   if (code !== oauth.JWT_TIMESTAMP_CHECK) return null;
   const seconds = Math.round(Math.abs(Number(claims?.[claim]) - now));
-  const when = claim === "exp" ? `ended ${seconds} s ago` : `begins in ${seconds} s`;
-  return `By this computer's clock the login that the identity provider gave ${when}. Set the clock of this computer, or of the provider, and sign in again.`;
+  const when = claim === "exp" ? `ended ${seconds} s ago` : `becomes valid in ${seconds} s`;
+  return `By this computer's clock the login ${when}. Set the clock of this computer, or of the identity provider, and sign in again.`;
 }
 
 function otherIssuer(found: unknown, expected: string): string {
   const advice = String(found).includes("{")
-    ? "A name with {...} stands for every tenant: --oidc-issuer of the gateway must name your own tenant."
-    : "Have --oidc-issuer of the gateway corrected.";
+    ? "A name with {...} is for every tenant: set the gateway's --oidc-issuer to your own tenant."
+    : "Correct the gateway's --oidc-issuer.";
   return `The identity provider's issuer is ${bounded(found)}, and this page expects ${bounded(expected)}. ${advice}`;
 }
 
@@ -183,15 +183,15 @@ function bounded(text: unknown): string {
 /** Why a login failed, as a sentence. Of what the provider sent it holds its own word for the error, its issuer and times, all bounded. */
 export function loginSentence(thrown: unknown, issuer: string): string {
   const host = new URL(issuer).host;
-  if (globalThis.crypto?.subtle === undefined) return "This page was not opened by https, without which browsers do not log in.";
+  if (globalThis.crypto?.subtle === undefined) return "This page was not opened with https, which a login requires.";
   if (thrown instanceof oauth.AuthorizationResponseError || thrown instanceof oauth.ResponseBodyError) {
-    const word = /^[a-z_]{1,40}$/.test(thrown.error) ? thrown.error : "for no known reason";
-    return `The identity provider (${host}) has refused the login: ${word}.`;
+    const word = /^[a-z_]{1,40}$/.test(thrown.error) ? thrown.error : "for an unknown reason";
+    return `The identity provider (${host}) refused the login: ${word}.`;
   }
   const difference = thrown instanceof oauth.OperationProcessingError ? differenceIn(thrown, issuer) : null;
   if (difference !== null) return difference;
   if (thrown instanceof oauth.OperationProcessingError || thrown instanceof oauth.UnsupportedOperationError) {
-    return `The answer of the identity provider (${host}) does not belong to this login, or is not what was asked for.`;
+    return `The answer of the identity provider (${host}) does not belong to this login.`;
   }
   return `The identity provider (${host}) does not answer. Try again in a moment.`;
 }

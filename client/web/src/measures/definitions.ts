@@ -43,14 +43,14 @@ function toEsthetic([nose, lip, chin]: readonly FacePoint[]): number {
 }
 
 function noNose([nose, lip, chin]: readonly FacePoint[]): string | null {
-  if (nose.up <= lip.up || lip.up <= chin.up) return "nose tip, lip and chin do not lie one below the other: check them";
+  if (nose.up <= lip.up || lip.up <= chin.up) return "nose tip, lip and chin are not one below the other: check them";
   const isNose = nose.forward - Math.min(lip.forward, chin.forward) >= LEAST_NOSE_MM;
   return isNose ? null : "the profile has no nose in front of lip and chin: there is no E-line";
 }
 
 function shortArm([a, at, b]: readonly FacePoint[]): string | null {
   const isShort = profileDistanceMm(a, at) < LEAST_ARM_MM || profileDistanceMm(at, b) < LEAST_ARM_MM;
-  return isShort ? "two of its landmarks lie on each other: check them" : null;
+  return isShort ? "two of its landmarks coincide: check them" : null;
 }
 
 /** How far the lower line turns back from the upper one; positive: convex. */
@@ -117,7 +117,7 @@ export const MEASURES: readonly MeasureDefinition[] = [
     unit: "deg",
     landmarks: ["upper_molar_left", "upper_molar_right"],
     norm: null,
-    problem: ([left, right]) => (left.left - right.left < LEAST_ARM_MM ? "left and right molar lie on each other or are exchanged: check them" : null),
+    problem: ([left, right]) => (left.left - right.left < LEAST_ARM_MM ? "left and right molar coincide or are swapped: check them" : null),
     of: cantDeg,
   },
 ];

@@ -31,7 +31,7 @@ export function evaluate(definition: MeasureDefinition, face: MeasuredFace): Mea
   if (missing.length > 0) return { definition, kind: "missing", landmarks: missing };
   const points = (of: FacePoints) => definition.landmarks.map((name) => of.get(name) as FacePoint);
   const [before, after] = [points(face.before), points(face.after)];
-  if (definition.isFromMiddle === true && !face.isMiddleKnown) return { definition, kind: "impossible", text: "where the midsagittal plane lies is not known of this case" };
+  if (definition.isFromMiddle === true && !face.isMiddleKnown) return { definition, kind: "impossible", text: "the midsagittal plane of this case is unknown" };
   const text = definition.problem(before) ?? definition.problem(after);
   if (text !== null) return { definition, kind: "impossible", text };
   return { definition, kind: "value", before: definition.of(before), after: definition.of(after), band: bandOf(definition, after, face.bandsMm) };

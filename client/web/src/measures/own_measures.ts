@@ -23,7 +23,7 @@ export function ownDefinition({ landmarks }: OwnMeasure, index: number, label: (
     norm: null,
     problem: ([a, at, b]) => {
       if (isDistance) return null;
-      return distanceMm(a, at) < LEAST_ARM_MM || distanceMm(at, b) < LEAST_ARM_MM ? "two of its landmarks lie on each other: check them" : null;
+      return distanceMm(a, at) < LEAST_ARM_MM || distanceMm(at, b) < LEAST_ARM_MM ? "two of its landmarks coincide: check them" : null;
     },
     of: ([a, at, b]) => (isDistance ? distanceMm(a, at) : angleDeg(a, at, b)),
   };

@@ -145,9 +145,9 @@ type PartReader = (field: Field) => Uint8Array<ArrayBuffer>;
 function openParts(bytes: Uint8Array<ArrayBuffer>): { root: Field; part: PartReader } {
   const head = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const magic = bytes.length < HEAD_BYTES ? "" : new TextDecoder().decode(bytes.subarray(0, 8));
-  if (magic !== MAGIC || head.getUint32(8, true) !== VERSION) throw new Error("the data are of another form than this page");
+  if (magic !== MAGIC || head.getUint32(8, true) !== VERSION) throw new Error("the data has another format than this page");
   const length = head.getUint32(12, true);
-  if (length > MOST_JSON_BYTES || HEAD_BYTES + length > bytes.length) throw new Error("the data are cut off");
+  if (length > MOST_JSON_BYTES || HEAD_BYTES + length > bytes.length) throw new Error("the data is incomplete");
   const root = new Field(JSON.parse(new TextDecoder().decode(bytes.subarray(HEAD_BYTES, HEAD_BYTES + length))), "");
   let end = aligned(HEAD_BYTES + length);
   const parts = root.get("parts").list(MOST_PARTS).map((field) => {

@@ -19,7 +19,7 @@ function splitAt(template: string, marks: string[]): string[] {
   let rest = template;
   for (const mark of marks) {
     const pieces = rest.split(mark);
-    if (pieces.length !== 2) throw new Error("the page for files that move is of another version than the planner: build or install them together");
+    if (pieces.length !== 2) throw new Error("the page of moving files has another version than the planner: build or install them together");
     parts.push(pieces[0]);
     rest = pieces[1];
   }

@@ -33,8 +33,8 @@ const MOST_DATA_BYTES = 256 << 20;
 
 /** Without a password: only compressed. Rejects with an Error where there is more than a page takes, and where the browser has no hash. */
 export async function seal(data: Uint8Array<ArrayBuffer>, password: string): Promise<Sealed> {
-  if (data.length > MOST_DATA_BYTES) throw new Error(`the file that moves would hold ${data.length} bytes, and may hold ${MOST_DATA_BYTES}`);
-  const subtle = subtleCrypto("writes files that move");
+  if (data.length > MOST_DATA_BYTES) throw new Error(`the moving file would have ${data.length} bytes; the limit is ${MOST_DATA_BYTES}`);
+  const subtle = subtleCrypto("writes moving files");
   const packed = await collect(new Blob([data]).stream().pipeThrough(new CompressionStream("gzip")));
   if (password === "") return { envelope: await envelopeOf(packed), payload: packed };
   const salt = crypto.getRandomValues(new Uint8Array(SALT_BYTES));

@@ -14,7 +14,7 @@ import { movingPage } from "./moving_page";
 
 // The script of a file that moves. It stands before the data in the page, so that it can say when they are cut off.
 
-const DAMAGED = "This file is damaged or not complete. Get it again from who gave it to you.";
+const DAMAGED = "This file is damaged or incomplete. Ask its sender for a new copy.";
 const TOO_OLD = "This browser is too old for this file: open it in a current Firefox, Chromium, Chrome, Edge or Safari.";
 
 /** For tests: the head. Nothing of the page asks it. */

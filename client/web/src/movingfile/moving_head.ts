@@ -65,7 +65,7 @@ export class MovingHead {
     const atRest = await engine.ask(data.handles.map(({ pivotMm }) => ({ rotationVector: [0, 0, 0], pivotMm, translationMm: [0, 0, 0], scale: 1 })));
     const count = atRest === null ? 0 : atRest.positions.length / 3;
     const isWithin = data.surfaces.every(({ follows }) => follows === null || follows.places.every((place) => place < count));
-    if (atRest === null || !isWithin) throw new Error("the answers are of another head than the surfaces");
+    if (atRest === null || !isWithin) throw new Error("the answers belong to another head than the surfaces");
     const head = new MovingHead(container, data, engine, Float32Array.from(atRest.positions), listener);
     head.showShare(1);
     return head;

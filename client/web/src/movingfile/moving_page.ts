@@ -29,8 +29,8 @@ const MODELS: Record<string, string> = {
 };
 
 const NOT_SHOWN: Record<NotShown, string> = {
-  beyond: "Beyond what this file can answer: the picture shows the last movement that it can.",
-  failed: "This movement could not be computed: the picture shows an older one. If that stays so, close the page and open the file again.",
+  beyond: "Outside the prepared range: the picture shows the last movement within it.",
+  failed: "This movement could not be computed: the picture shows an older one. If this persists, open the file again.",
 };
 
 const STEP = 0.1;
@@ -39,7 +39,7 @@ const STEP = 0.1;
 export async function movingPage(data: MovingData, engine: Engine): Promise<{ element: HTMLElement; head: MovingHead }> {
   const picture = new PictureBox(() => {});
   const head = await MovingHead.make(picture.element, data, engine, picture.listener);
-  picture.dress(head.view, "Head in three dimensions: drag to turn it, turn the wheel or spread two fingers to come nearer");
+  picture.dress(head.view, "3D view of the head: drag to rotate, use the wheel or two fingers to zoom");
   const legend = legendBox();
   const numbers = numbersPanel(data, head);
   head.onShown = (shown) => {
@@ -54,7 +54,7 @@ export async function movingPage(data: MovingData, engine: Engine): Promise<{ el
 
 /** From the face of today to the planned one. */
 function beforeAfter(head: MovingHead): HTMLElement {
-  const between = slider("From before to planned", { least: 0, most: 1, step: 0.01, value: 1 }, (share) => head.showShare(share));
+  const between = slider("From pre-op to post-op (predicted)", { least: 0, most: 1, step: 0.01, value: 1 }, (share) => head.showShare(share));
   const go = (share: number) => {
     between.value = String(share);
     head.showShare(share);
@@ -63,7 +63,7 @@ function beforeAfter(head: MovingHead): HTMLElement {
   return section("Before and after", [
     el("div", { class: "buttons" }, [button("Before", () => go(0)), button("Planned", () => go(1))]),
     between,
-    el("label", { class: "check" }, [colored, "Colours show the movement of the skin"]),
+    el("label", { class: "check" }, [colored, "Color by skin movement"]),
   ]);
 }
 
@@ -71,7 +71,7 @@ function segmentSection(head: MovingHead, index: number): HTMLElement {
   const { label } = head.data.handles[index];
   const swatch = el("span", { class: "swatch" });
   swatch.style.background = cssColor(segmentColor(index));
-  const part = section(label, [...MOVE_KEYS.map((key) => moveRow(head, index, key)), el("div", { class: "buttons" }, [button("Back to rest", () => head.plan.reset(index))])]);
+  const part = section(label, [...MOVE_KEYS.map((key) => moveRow(head, index, key)), el("div", { class: "buttons" }, [button("Back to pre-op", () => head.plan.reset(index))])]);
   part.querySelector("h2")?.prepend(swatch);
   return part;
 }
@@ -89,7 +89,7 @@ function moveRow({ plan }: MovingHead, index: number, key: MoveKey): HTMLElement
     control.value = String(value);
     number.textContent = formatWithUnit(value, unit);
     number.classList.toggle("warning", Math.abs(value) >= limit - 1e-9);
-    number.title = Math.abs(value) >= limit - 1e-9 ? "As far as this file goes" : "";
+    number.title = Math.abs(value) >= limit - 1e-9 ? "Limit of this file" : "";
     control.setAttribute("aria-valuetext", number.textContent);
   };
   plan.onChange(throttleToFrame(show));
@@ -101,7 +101,7 @@ function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElemen
   const problem = el("p", { class: "warning", attributes: { role: "status" } });
   const largest = el("p");
   const exactness = el("p", { class: "quiet" });
-  const lacks = [head.isInWorker ? "" : "no thread of its own", head.isFast ? "" : "no WebAssembly"].filter((lack) => lack !== "");
+  const lacks = [head.isInWorker ? "" : "no background thread", head.isFast ? "" : "no WebAssembly"].filter((lack) => lack !== "");
   const slow = lacks.length === 0 ? null : el("p", { class: "quiet", text: `This browser gives the file ${lacks.join(" and ")}: it moves more slowly.` });
   const element = section("Prediction", [
     problem,
@@ -124,8 +124,8 @@ function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElemen
 
 function withBand({ largestMm, band }: Shown): string {
   const number = `${formatNumber(largestMm)} mm`;
-  if (band === null) return `${number}. The band of uncertainty of this model or pose is not known.`;
-  return `${number}, ${formatNumber(band.lowestMm)} to ${formatNumber(band.highestMm)} in 95 of 100 cases if only the tissue's stiffness is in doubt.`;
+  if (band === null) return `${number}. No 95 % interval for this model or pose.`;
+  return `${number}, ${formatNumber(band.lowestMm)} to ${formatNumber(band.highestMm)} (95 % interval, stiffness only).`;
 }
 
 function describeError({ errorBoundMm, isEstimate }: Shown): string {
@@ -146,7 +146,7 @@ function onceAPictureWith<T>(show: (value: T) => void): (value: T) => void {
 }
 
 function legendBox(): { element: HTMLElement; show(legend: Shown["legend"]): void } {
-  const bar = el("div", { class: "colors", attributes: { role: "img", "aria-label": "Colours from none to most" } });
+  const bar = el("div", { class: "colors", attributes: { role: "img", "aria-label": "Colors from zero to maximum" } });
   bar.style.background = `linear-gradient(to right, ${VIRIDIS.anchors.map((color) => `rgb(${color.join(" ")})`).join(", ")})`;
   const title = el("strong");
   const ticks = el("div", { class: "ticks" });

@@ -21,7 +21,7 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, accou
   const showList = async () => {
     try {
       list.replaceChildren(...(await listCases(gateway)).map((entry) => caseItem(entry, onOpen)));
-      told.textContent = list.childElementCount === 0 ? "The server has no case yet." : "";
+      told.textContent = list.childElementCount === 0 ? "The server has no cases yet." : "";
     } catch (thrown) {
       problem.textContent = `The cases cannot be listed. ${messageOf(thrown)}`;
     }
@@ -62,7 +62,7 @@ function caseItem(entry: Case, onOpen: (entry: Case) => void): HTMLElement {
   const seconds = Number(entry.createTime?.seconds ?? 0n);
   const facts = [formatBytes(Number(entry.totalBytes)), seconds === 0 ? "" : new Date(1000 * seconds).toLocaleDateString()];
   const open = el("button", { attributes: { type: "button" }, on: { click: () => onOpen(entry) } }, [
-    el("strong", { text: entry.title === "" ? "Without a name" : entry.title }),
+    el("strong", { text: entry.title === "" ? "Untitled" : entry.title }),
     el("small", { text: facts.filter((fact) => fact !== "").join(" · ") }),
   ]);
   return el("li", {}, [open]);
@@ -76,7 +76,7 @@ function dropZone(onFile: (file: File) => void): HTMLElement {
     if (file !== undefined) onFile(file);
     input.value = "";
   });
-  const zone = el("div", { class: "drop" }, [el("label", { text: "Drop a case file here, or choose one", attributes: { for: id } }), input]);
+  const zone = el("div", { class: "drop" }, [el("label", { text: "Drop a case file here, or choose a file", attributes: { for: id } }), input]);
   const mark = (isOver: boolean) => (event: DragEvent) => {
     event.preventDefault();
     zone.classList.toggle("over", isOver);

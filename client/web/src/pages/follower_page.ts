@@ -43,7 +43,7 @@ export function endOfWatch(error: CallError): string {
   return error.reason === "SESSION_NOT_FOUND" ? "The session that you followed has ended." : messageOf(error);
 }
 
-export const LINK_HAS_ENDED = "The link has expired, or was ended. Ask whoever sent it for another one.";
+export const LINK_HAS_ENDED = "The link has expired or was revoked. Ask its sender for a new one.";
 
 interface FollowerListener {
   onConnection(connection: Connection): void;
@@ -79,7 +79,7 @@ export class Follower {
       onWaiting: (isWaiting) => listener.onConnection({ kind: isWaiting ? "waiting" : "live" }),
       onPicture: (picture, used) => this.show(picture, used),
       onNotice: ({ notice }) => {
-        if (notice.case === "draining" && !gateway.routes.isCluster) listener.onNotice("The server is about to end; the page connects again by itself.");
+        if (notice.case === "draining" && !gateway.routes.isCluster) listener.onNotice("The server is shutting down; the page reconnects automatically.");
         if (notice.case === "evicted") listener.onNotice("The session is being prepared again.");
       },
       onBroken: (error) => listener.onConnection(interruption.connection(error)),
@@ -91,7 +91,7 @@ export class Follower {
     this.positions = new Float32Array(picture.positions);
     this.number = picture.frame.number;
     const count = picture.vertices.length === 0 ? this.file.manifest.mesh.vertexCount : picture.vertices.length;
-    if (picture.positions.length !== 3 * count) throw new Error("a picture came that has another number of vertices than it says");
+    if (picture.positions.length !== 3 * count) throw new Error("a frame has another number of vertices than stated");
     this.displacements.fill(0);
     for (let i = 0; i < count; ++i) {
       const place = this.places.get(picture.vertices.length === 0 ? i : picture.vertices[i]);
@@ -126,7 +126,7 @@ export class Follower {
       const session = await this.gateway.sessions.getSession({ name: this.session }, { headers: sessionMetadata(this.session) });
       this.view.setPoses(fromMessages(session.committedPoses));
     } catch (thrown) {
-      this.listener.onNotice(`Where the bone is cannot be told. ${messageOf(toCallError(thrown))}`);
+      this.listener.onNotice(`The position of the bone is unknown. ${messageOf(toCallError(thrown))}`);
     }
   }
 }

@@ -28,7 +28,7 @@ import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 export function pictureBox(file: CaseFile, onNotice: (text: string) => void): { element: HTMLElement; view: HeadView } {
   const box = new PictureBox((isLost) => !isLost && onNotice("The picture is back."));
   const view = new HeadView(box.element, file, box.listener);
-  box.dress(view, "Head in three dimensions. Press the question mark for keys.");
+  box.dress(view, "3D view of the head. Press ? for keyboard shortcuts.");
   return { element: box.element, view };
 }
 

@@ -22,7 +22,7 @@ export function exportPanel(bench: Workbench): HTMLElement {
   const remark = () => `Model ${bench.modelInfo(bench.model.value)?.name ?? "unknown"}`;
   const png = async () => {
     const picture = await bench.view.stage.snapshot();
-    if (picture === null) throw new Error("this browser draws no 3D pictures");
+    if (picture === null) throw new Error("this browser cannot draw 3D pictures");
     const background = getComputedStyle(document.body).backgroundColor;
     download("tissueform.png", await toPng(picture, background, remark()));
   };
@@ -39,7 +39,7 @@ export function exportPanel(bench: Workbench): HTMLElement {
       button("Plan JSON", tell(plan)),
       caseButton(bench),
     ]),
-    el("p", { class: "quiet", text: "In mm, LPS, as it is shown. Plan JSON names Case file as its mesh: save both into one folder. Every file says: not a medical device." }),
+    el("p", { class: "quiet", text: "In mm, LPS, as shown. Plan JSON uses Case file as its mesh: save both in one folder. Every file states: not a medical device." }),
     movingFilePart(bench),
   ]);
 }

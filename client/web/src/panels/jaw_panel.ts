@@ -14,7 +14,7 @@ import { button, collapsible, el, throttleToFrame, slider } from "./dom";
 /** The jaw that opens about its condyles, and how the teeth meet. */
 export function jawPanel(bench: Workbench): HTMLElement {
   const bite = bitePart(bench);
-  return collapsible("Jaw and bite", [openingPart(bench), bite.element], (isOpen) => {
+  return collapsible("Jaw and occlusion", [openingPart(bench), bite.element], (isOpen) => {
     bench.view.setPoints("axis", isOpen ? axisPoints(bench) : []);
     if (!isOpen) bite.off();
     if (!isOpen && bench.jaw.degrees !== 0) bench.open(0);
@@ -32,10 +32,10 @@ function axisPoints({ jaw: { hinge } }: Workbench): Vector[] {
 function openingPart(bench: Workbench): HTMLElement {
   const { hinge } = bench.jaw;
   if (hinge === null || lowerJawHandles(bench.file).length === 0) {
-    return el("p", { class: "quiet", text: "The case has no segment of the lower jaw, or nothing that tells where its condyles are." });
+    return el("p", { class: "quiet", text: "The case has no mandible segment, or no information about its condyles." });
   }
   const told = el("p", { attributes: { role: "status" } });
-  const control = slider("Opening of the jaw", { least: 0, most: MOST_OPENING_DEG, step: 0.5, value: 0 }, (value) => bench.open(value));
+  const control = slider("Jaw rotation (hinge axis)", { least: 0, most: MOST_OPENING_DEG, step: 0.5, value: 0 }, (value) => bench.open(value));
   const show = () => {
     const mm = incisorDistanceMm(bench.file, bench.shownPoses);
     const { degrees } = bench.jaw;
@@ -49,16 +49,16 @@ function openingPart(bench: Workbench): HTMLElement {
   return el("div", { class: "landmark-part" }, [
     el("label", { class: "inline" }, ["Opening", control]),
     told,
-    el("p", { class: "quiet", text: `A hinge through ${how} (blue points). The condyles do not glide; the opening is no part of the plan.` }),
+    el("p", { class: "quiet", text: `A hinge through ${how} (blue points). The condyles do not translate; the opening is not part of the plan.` }),
     el("div", { class: "buttons" }, [button("Close", () => bench.open(0))]),
   ]);
 }
 
 const SETTLE_MS = 150;
 /** Dark to bright: far to near. */
-const LEGEND: ShownLegend = { title: "Distance of upper and lower teeth", ticksMm: [MOST_GAP_MM, MOST_GAP_MM / 2, 0], note: `yellow: they touch; dark: ${MOST_GAP_MM} mm apart or more` };
+const LEGEND: ShownLegend = { title: "Distance between upper and lower teeth", ticksMm: [MOST_GAP_MM, MOST_GAP_MM / 2, 0], note: `yellow: contact; dark: ${MOST_GAP_MM} mm apart or more` };
 
-/** Teeth alone, with the distance between upper and lower as colours. */
+/** Teeth alone, with the distance between upper and lower as colors. */
 function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
   const { surfaces } = bench.view.head;
   const lower = lowerJawHandles(bench.file);
@@ -88,7 +88,7 @@ function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
     bench.view.stage.invalidate();
     find();
   };
-  const toggle = button("Show the bite", () => set(!isOn()), { attributes: { "aria-pressed": "false" } });
+  const toggle = button("Show occlusal contacts", () => set(!isOn()), { attributes: { "aria-pressed": "false" } });
   bench.shown.watch(() => {
     clearTimeout(timer);
     timer = setTimeout(find, SETTLE_MS);
@@ -109,8 +109,8 @@ function distanceColors(distancesMm: Float32Array): Uint8Array {
 }
 
 function contactText({ areaMm2, deepestMm, leastMm }: Contact): string {
-  if (leastMm === null) return `The teeth lie more than ${MOST_GAP_MM} mm from each other.`;
-  if (areaMm2 === 0) return `No contact; the teeth come to ${formatNumber(leastMm)} mm of each other.`;
-  const depth = deepestMm < 0.05 ? "" : `; they lie up to ${formatNumber(deepestMm)} mm in each other`;
+  if (leastMm === null) return `The teeth are more than ${MOST_GAP_MM} mm apart.`;
+  if (areaMm2 === 0) return `No contact; the smallest distance is ${formatNumber(leastMm)} mm.`;
+  const depth = deepestMm < 0.05 ? "" : `; overlap up to ${formatNumber(deepestMm)} mm`;
   return `Contact on about ${formatNumber(areaMm2, 0)} mm² of the upper teeth${depth}.`;
 }

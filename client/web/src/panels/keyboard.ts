@@ -32,9 +32,9 @@ const HELP: readonly [string, string][] = [
   ["I K · U O · J L", "pitch · roll · yaw, by 0.5°"],
   ["Shift", "with these: by 0.1"],
   ["N", "the next segment"],
-  ["Enter, Escape", "where a point is asked for: takes the one in the picture’s middle; leaves it"],
-  ["G", "the gizmo turns or shifts"],
-  ["Arrows, + −", "look from elsewhere, nearer, farther"],
+  ["Enter, Escape", "when choosing a point: take the point in the middle of the picture; cancel"],
+  ["G", "switch the gizmo between rotation and translation"],
+  ["Arrows, + −", "rotate and zoom the view"],
   ["1 … 5", "front, left, right, 3/4, below"],
   ["Ctrl+Z, Ctrl+Y", "undo, redo"],
   ["?", "this help"],
@@ -101,7 +101,7 @@ export function bindKeys(bench: Workbench, help: HTMLDialogElement): void {
 export function helpDialog(): HTMLDialogElement {
   const rows = HELP.flatMap(([keys, text]) => [el("dt", { text: keys }), el("dd", { text })]);
   const dialog = el("dialog", { attributes: { "aria-label": "Keys" } }, [
-    el("h2", { text: "Keys, while the picture has the focus" }),
+    el("h2", { text: "Keyboard shortcuts, while the picture has the focus" }),
     el("dl", {}, rows),
     button("Close", () => dialog.close()),
   ]);

@@ -12,7 +12,7 @@ export function landmarksPart(bench: Workbench): { element: HTMLElement; show(is
   let isShown = false;
   const state = el("p", { class: "quiet" });
   const list = el("ul", { class: "landmarks" });
-  const confirm = button("Confirm all", () => book.confirm(Array.from(book.suggestions.keys())), { attributes: { title: "Takes what is suggested, after you have looked at it" } });
+  const confirm = button("Confirm all", () => book.confirm(Array.from(book.suggestions.keys())), { attributes: { title: "Accept the suggestion after checking it" } });
   const undo = button("Undo landmark", () => book.undo());
   const redo = button("Redo landmark", () => book.redo());
   const own = button("Own point", () => pick(bench, book.nextPoint(), "a point of your own", ["skin", "teeth", "segment", "bone"]));

@@ -20,8 +20,8 @@ interface ModelText {
 const MODELS: Record<string, ModelText> = {
   gradient_field: { label: "Gradient field", text: "Geometric, not mechanical: spreads the motion of the bone through the tissue, weighted by its stiffness. Computes no forces. Instant: for a first look while you drag." },
   arap: { label: "As rigid as possible", text: "Keeps each element as near to a rigid motion as it can, weighted by its stiffness: like a corotational elastic solid without Poisson effect. Iterates, so it is slower. For segments that shift without turning." },
-  linear_elastic: { label: "Linear elastic", text: "Linear finite elements: Hooke’s law, small strains and rotations. Instant. Valid for moves up to about 5 mm and turns of a few degrees. Gives a band of uncertainty." },
-  neo_hookean: { label: "Neo-Hookean", text: "Nonlinear finite elements: hyperelastic tissue, large deformations. Shows an estimate while you drag and the full solution when you stop. Gives a band of uncertainty." },
+  linear_elastic: { label: "Linear elastic", text: "Linear finite elements: Hooke’s law, small strains and rotations. Instant. Valid for moves up to about 5 mm and turns of a few degrees. Provides a 95 % interval." },
+  neo_hookean: { label: "Neo-Hookean", text: "Nonlinear finite elements: hyperelastic tissue, large deformations. Shows an estimate while you drag and the full solution when you stop. Provides a 95 % interval." },
 };
 
 export function modelText(name: string): ModelText {
@@ -50,8 +50,8 @@ export function modelPanel(bench: Workbench): HTMLElement {
 /** Who answers the hand, and what stops or starts that. */
 function localAnswers(bench: Workbench): HTMLElement {
   const text = el("span", { attributes: { "data-local": "none" } });
-  const stop = button("Stop", () => bench.local.stop(), { attributes: { title: "The server answers every move" } });
-  const start = button("Answer here", () => bench.local.resume(), { attributes: { title: "This page answers moves by itself, without waiting for the server" } });
+  const stop = button("Stop", () => bench.local.stop(), { attributes: { title: "Answers from the server" } });
+  const start = button("Answer here", () => bench.local.resume(), { attributes: { title: "Answers computed in this page, without waiting for the server" } });
   const show = () => {
     const state = bench.localState.value;
     const told = describeLocal(state);
@@ -70,26 +70,26 @@ export function describeLocal(state: LocalState): string {
     case "none":
       return "The server answers.";
     case "fetching":
-      return `The server answers. This page learns to: ${Math.round(100 * state.share)} %.`;
+      return `The server answers. This page is loading its columns: ${Math.round(100 * state.share)} %.`;
     case "stopped":
       return "The server answers.";
     case "failed":
       return `The server answers. This page cannot: ${state.text}`;
     case "ready": {
-      if (state.coverage === "beyond") return "Beyond what was prepared: the server answers.";
-      const lacks = [state.kernel === "webassembly" ? "" : "without WebAssembly", state.hasWorkers ? "" : "without a thread of its own"].filter((text) => text !== "");
+      if (state.coverage === "beyond") return "Outside the prepared range: the server answers.";
+      const lacks = [state.kernel === "webassembly" ? "" : "without WebAssembly", state.hasWorkers ? "" : "without a background thread"].filter((text) => text !== "");
       const slow = lacks.length === 0 ? "" : ` (${lacks.join(", ")}: slower)`;
       return `This page answers at once${slow}; the server confirms.`;
     }
   }
 }
 
-/** Which map lies on the skin, and what its colours mean. */
+/** Which map lies on the skin, and what its colors mean. */
 export function mapPanel(bench: Workbench): HTMLElement {
   const choose = (choice: MapChoice) => {
     bench.chooseMap(choice).catch((thrown) => (bench.notice.value = messageOf(thrown)));
   };
-  const field = select<MapChoice>("Colours show", mapChoices(bench), choose);
+  const field = select<MapChoice>("Color by", mapChoices(bench), choose);
   const show = () => {
     const choices = mapChoices(bench);
     field.set(choices, Math.max(0, choices.findIndex((choice) => isSame(choice.value, bench.map.choice.value))));
@@ -102,10 +102,10 @@ export function mapPanel(bench: Workbench): HTMLElement {
 
 function mapChoices(bench: Workbench): Choice<MapChoice>[] {
   const choices: Choice<MapChoice>[] = [
-    { value: { kind: "none" }, label: "Skin as it looks" },
+    { value: { kind: "none" }, label: "Skin color" },
     { value: { kind: "movement" }, label: "Movement of the skin" },
   ];
-  if (bench.hasBand) choices.push({ value: { kind: "band" }, label: "Band of uncertainty" });
+  if (bench.hasBand) choices.push({ value: { kind: "band" }, label: "95 % interval (material)" });
   for (const { model, name } of bench.models) {
     const { label } = modelText(name);
     if (model !== bench.model.value) choices.push({ value: { kind: "model", model, label }, label: `Difference to ${label}` });
@@ -126,9 +126,9 @@ function isSame(a: MapChoice, b: MapChoice): boolean {
 
 const BAR_WIDTH = 256;
 
-/** The legend over the picture, of the skin's map or of the bite: title, colours, range in mm. */
+/** The legend over the picture, of the skin's map or of the bite: title, colors, range in mm. */
 export function legendBox(bench: Workbench): HTMLElement {
-  const bar = el("canvas", { attributes: { width: String(BAR_WIDTH), height: "1", role: "img", "aria-label": "Colours from the first number to the last" } });
+  const bar = el("canvas", { attributes: { width: String(BAR_WIDTH), height: "1", role: "img", "aria-label": "Color range" } });
   drawBar(bar);
   const title = el("strong");
   const ticks = el("div", { class: "ticks" });
@@ -155,7 +155,7 @@ function mapLegend(legend: MapLegend | null): ShownLegend | null {
 
 /** "largest 8.12 mm, in 95 of 100 cases 7.50 to 8.80", the second where it is known. */
 export function largestText({ largestMm, band }: Pick<MapLegend, "largestMm" | "band">): string {
-  const range = band === null ? "" : `, in 95 of 100 cases ${formatNumber(band.lowestMm, 2)} to ${formatNumber(band.highestMm, 2)}`;
+  const range = band === null ? "" : `, 95 % interval ${formatNumber(band.lowestMm, 2)} to ${formatNumber(band.highestMm, 2)}`;
   return `largest ${formatNumber(largestMm, 2)} mm${range}`;
 }
 

@@ -35,10 +35,10 @@ export function measuresPanel(bench: Workbench): HTMLElement {
 function captionOf(bench: Workbench, results: readonly MeasureResult[]): string {
   const hasBand = results.some((result) => result.kind === "value" && result.band !== null);
   return [
-    `In the ${hasHeadFrame(bench.file) ? "head frame" : "axes of the scanner, for no head frame was found"}; forward, up and the patient’s left are positive.`,
-    hasBand ? "Below “after”: where it stays in 95 of 100 cases if nothing but the material is in doubt." : "",
-    bench.hasBand && bench.whyNoBand !== "" ? `No band is known: ${bench.whyNoBand}.` : "",
-    bench.showsPlan ? "" : `The face that is shown is not the plan’s${hasBand ? "" : "; no band of it is known"}.`,
+    `In the ${hasHeadFrame(bench.file) ? "head frame" : "scanner axes (no head frame was found)"}; forward, up and the patient’s left are positive.`,
+    hasBand ? "Below “after”: 95 % interval, material uncertainty only." : "",
+    bench.hasBand && bench.whyNoBand !== "" ? `No 95 % interval: ${bench.whyNoBand}.` : "",
+    bench.showsPlan ? "" : `The face that is shown is not the plan’s${hasBand ? "" : "; it has no 95 % interval"}.`,
   ].filter((text) => text !== "").join(" ");
 }
 

@@ -30,7 +30,7 @@ export function movementsPanel(bench: Workbench): HTMLElement {
   const show = () => {
     const movements = landmarkMovements(bench);
     const hasBand = movements.some(({ bandMm }) => bandMm !== null);
-    caption.textContent = `${captionOf(headFrame.source)}${!hasBand ? "" : " Below a number of the skin: by how much more or less it is in 95 of 100 cases if nothing but the material is in doubt; below “in all” from where to where."}`;
+    caption.textContent = `${captionOf(headFrame.source)}${!hasBand ? "" : " Below a number of the skin: 95 % interval, material uncertainty only."}`;
     rows.forEach(({ row, cells }, index) => {
       const { bandMm, ...movement } = movements[index];
       const plusMinus = bandMm === null ? "" : `± ${formatNumber(bandMm)}`;
@@ -40,7 +40,7 @@ export function movementsPanel(bench: Workbench): HTMLElement {
     });
   };
   bench.shown.watch(throttleToFrame(show));
-  const heads = ["Landmark", "Forward", "Left", "Up", "In all"].map((text) => el("th", { text, attributes: { scope: "col" } }));
+  const heads = ["Landmark", "Forward", "Left", "Up", "Total"].map((text) => el("th", { text, attributes: { scope: "col" } }));
   const table = el("table", {}, [caption, el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
   return section("Movements", [landmarks.length === 0 ? el("p", { class: "quiet", text: "The case has no landmarks." }) : table]);
 }

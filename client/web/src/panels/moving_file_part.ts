@@ -16,18 +16,18 @@ export function movingFilePart(bench: Workbench): HTMLElement {
   });
   const make = async () => {
     const answers = bench.local.heldColumns;
-    if (answers === null) throw new Error("a file that moves needs the columns of the model in this page: choose a model that has them, and wait until they have come");
+    if (answers === null) throw new Error("a moving file needs the model's columns in this page: choose a model with prepared answers, and wait until they are loaded");
     const model = bench.modelInfo(bench.model.value)?.name ?? "";
     const poses = bench.posesByHandle(bench.plan.poses());
     download("tissueform-moves.html", await movingFile(bench.file, { poses, model, answers }, password.value));
     password.value = "";
   };
-  const save: HTMLButtonElement = button("File that moves", () => {
+  const save: HTMLButtonElement = button("Moving file", () => {
     void whileBusy(save, make, (thrown) => (bench.notice.value = messageOf(thrown)));
   });
   return el("div", { class: "moving-part" }, [
     el("div", { class: "field" }, [el("label", { text: "Password", attributes: { for: id } }), password]),
     save,
-    el("p", { class: "quiet", text: "One page that moves without a server, with this plan. A face identifies: treat it like a photograph of the patient; with a password nobody else opens it." }),
+    el("p", { class: "quiet", text: "One page with this plan that works without a server. This file shows an identifiable face. Handle it like a patient photograph; a password encrypts it." }),
   ]);
 }

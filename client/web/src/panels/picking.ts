@@ -42,7 +42,7 @@ export function pickingBox(bench: Workbench): HTMLElement {
   const text = el("span");
   const box = el("div", { class: "picking", attributes: { role: "status" } }, [
     el("span", { class: "middle", attributes: { "aria-hidden": "true" } }),
-    el("p", {}, [text, " ", el("small", { text: "With keys: turn the picture until the point is in its middle, then Enter." }), button("Cancel", () => (bench.picking.value = null))]),
+    el("p", {}, [text, " ", el("small", { text: "Keyboard: rotate the picture until the point is in the middle, then press Enter." }), button("Cancel", () => (bench.picking.value = null))]),
   ]);
   bench.picking.watch((picking) => {
     box.hidden = picking === null;

@@ -7,7 +7,7 @@ import type { Stage, StageListener } from "../scene/stage";
 import { button, el, throttleToFrame, whileBusy } from "./dom";
 import { pictureMarks } from "./view_bar";
 
-const LOST = "The browser took the graphics card away, so the picture is not drawn. Numbers and sliders still work.";
+const LOST = "The browser lost access to the graphics card, so the picture is not drawn. Numbers and sliders still work.";
 
 /**
  * Where a head is drawn, with what lies over every picture: letters, scale, and a word where there is no picture. Make the view in

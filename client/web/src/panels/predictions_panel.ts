@@ -24,7 +24,7 @@ function storeForm(bench: Workbench): HTMLElement {
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const run = async () => {
-      bench.notice.value = "The server solves in full and keeps the answer.";
+      bench.notice.value = "The server computes the full solution and stores it.";
       const prediction = await bench.stored.store(title.value.trim() === "" ? defaultTitle(bench) : title.value.trim());
       title.value = "";
       bench.notice.value = `Stored “${prediction.title}”.`;
@@ -44,7 +44,7 @@ function predictionList(bench: Workbench): HTMLElement {
     const compared = bench.comparison.value?.to.name;
     const items = bench.stored.all.value.map((prediction) => predictionItem(bench, prediction, prediction.name === compared));
     list.replaceChildren(...items);
-    if (items.length === 0) list.append(el("li", { class: "quiet", text: "None is stored yet." }));
+    if (items.length === 0) list.append(el("li", { class: "quiet", text: "No stored predictions yet." }));
   };
   bench.stored.all.watch(show);
   bench.pacs.byPrediction.watch(show);
@@ -60,7 +60,7 @@ function predictionItem(bench: Workbench, prediction: Prediction, isCompared: bo
   const info = bench.modelInfo(prediction.model);
   const seconds = Number(prediction.createTime?.seconds ?? 0n);
   const facts = [info === undefined ? "" : modelText(info.name).label, seconds === 0 ? "" : new Date(1000 * seconds).toLocaleString()];
-  const text = el("span", {}, [el("strong", { text: prediction.title || "Without a name" }), el("small", { text: facts.filter((fact) => fact !== "").join(" · ") })]);
+  const text = el("span", {}, [el("strong", { text: prediction.title || "Untitled" }), el("small", { text: facts.filter((fact) => fact !== "").join(" · ") })]);
   const onError = (thrown: unknown) => (bench.notice.value = messageOf(thrown));
   const toggle = async () => bench.compare(isCompared ? null : { from: "plan", to: prediction, share: 1 });
   const compare = button("Compare", () => void whileBusy(compare, toggle, onError), {
@@ -83,7 +83,7 @@ function pacsLine(bench: Workbench, prediction: Prediction): HTMLElement | null 
   });
   const withdraw = async () => (mayTakeBack(entry) ? bench.pacs.takeBack(entry) : undefined);
   const takeBack = button("Take back", () => void whileBusy(takeBack, withdraw, onError), {
-    attributes: { "aria-label": `Take ${prediction.title} back from the PACS` },
+    attributes: { "aria-label": `Withdraw ${prediction.title} from the PACS` },
   });
   return el("div", { class: "pacs" }, [
     entry === undefined ? null : el("small", { text: `PACS: ${exportText(entry)}`, attributes: { role: "status" } }),
@@ -98,7 +98,7 @@ function comparisonBox(bench: Workbench): HTMLElement {
     if (now !== null) bench.compare({ ...now, ...part }).catch((thrown) => (bench.notice.value = messageOf(thrown)));
   };
   const from = select<Comparison["from"]>("From", [], (value) => update({ from: value }));
-  const share = slider("From one to the other", { least: 0, most: 1, step: 0.01, value: 1 }, (value) => update({ share: value }));
+  const share = slider("Blend between the two", { least: 0, most: 1, step: 0.01, value: 1 }, (value) => update({ share: value }));
   const ends = el("div", { class: "ticks" });
   const box = el("div", { class: "comparison", attributes: { role: "group", "aria-label": "Comparison" } }, [
     from.element,
@@ -122,7 +122,7 @@ function fromChoices(bench: Workbench, to: Prediction): Choice<Comparison["from"
   const others = bench.stored.all.value.filter((prediction) => prediction.name !== to.name);
   return [
     { value: "plan", label: "The plan now" },
-    { value: "rest", label: "The face at rest" },
+    { value: "rest", label: "Pre-op face" },
     ...others.map((prediction) => ({ value: prediction, label: prediction.title })),
   ];
 }

@@ -14,7 +14,7 @@ export function reportPanel(bench: Workbench): HTMLElement {
     const run = async () => showReport(await reportSheet(bench));
     void whileBusy(open, run, (thrown) => (bench.notice.value = messageOf(thrown)));
   });
-  const text = "Plan, measures, profile, pictures and how they came about, as shown now. It names nobody; its pictures show the face.";
+  const text = "Plan, measures, profile, pictures and their origin, as shown now. It contains no patient name; its pictures show the face.";
   return collapsible("Report", [el("p", { class: "quiet", text }), el("div", { class: "buttons" }, [open])]);
 }
 

@@ -33,8 +33,8 @@ export function segmentsPanel(bench: Workbench): HTMLElement {
   const { plan } = bench;
   const undo = button("Undo", () => plan.undo(), { attributes: { title: "Ctrl+Z" } });
   const redo = button("Redo", () => plan.redo(), { attributes: { title: "Ctrl+Y" } });
-  const reset = button("Reset", () => plan.reset(bench.selected.value), { attributes: { title: "This segment back to rest" } });
-  const planned = button("Plan’s pose", () => plan.setPoses(posesOfCase(bench.file)), { attributes: { title: "All segments as the case’s plan has them" } });
+  const reset = button("Reset", () => plan.reset(bench.selected.value), { attributes: { title: "Reset this segment" } });
+  const planned = button("Plan’s pose", () => plan.setPoses(posesOfCase(bench.file)), { attributes: { title: "Reset all segments to the case’s plan" } });
   plan.onChange(() => {
     undo.disabled = !plan.canUndo;
     redo.disabled = !plan.canRedo;
@@ -81,7 +81,7 @@ function moveRow(bench: Workbench, key: MoveKey): HTMLElement {
     number.classList.remove("editing");
     const value = parseNumber(number.value, unit);
     number.setAttribute("aria-invalid", String(value === null));
-    if (value === null) bench.notice.value = `“${number.value}” is no number of ${unit === "mm" ? "millimetres" : "degrees"}.`;
+    if (value === null) bench.notice.value = `“${number.value}”: enter a number in ${unit === "mm" ? "millimeters" : "degrees"}.`;
     else if (!change(value, true)) {
       bench.notice.value = `${bench.plan.handles[selected()].label}: ${label.toLowerCase()} is limited to ${formatNumber(bench.plan.limit(selected(), key))} ${unit}.`;
     }
@@ -133,7 +133,7 @@ function penetrationText(bench: Workbench): HTMLElement {
   bench.penetrations.watch((found) => {
     text.hidden = found.length === 0;
     text.textContent = found
-      .map(({ segment, other, depthMm }) => `${segment} lies up to ${formatNumber(depthMm)} mm in ${other}.`)
+      .map(({ segment, other, depthMm }) => `${segment} overlaps ${other} by up to ${formatNumber(depthMm)} mm.`)
       .join(" ");
   });
   return text;

@@ -8,7 +8,7 @@ import { button, el, whileBusy } from "./dom";
 
 /** "nobody follows", "2 follow" */
 export function followersText(count: number): string {
-  if (count === 0) return "nobody follows";
+  if (count === 0) return "no followers";
   return count === 1 ? "one follows" : `${count} follow`;
 }
 
@@ -88,7 +88,7 @@ function describe(connection: Connection): string {
     case "moving":
       return "Moving to another server…";
     case "broken":
-      return `Connecting again. ${connection.text}`;
+      return `Reconnecting. ${connection.text}`;
     case "failed":
       return connection.text;
   }
@@ -101,7 +101,7 @@ function linkButtons(links: FollowLinks): HTMLElement {
   const end = button("End links", () => {
     const run = async () => {
       await links.endAll();
-      told.textContent = "all links have ended";
+      told.textContent = "all links were revoked";
     };
     void whileBusy(end, run, fail);
   });
@@ -131,7 +131,7 @@ async function copyText(text: string): Promise<boolean> {
     return true;
   } catch {
     // Without the right to write there the person copies it.
-    window.prompt("Link for who follows", text);
+    window.prompt("Follow link", text);
     return false;
   }
 }

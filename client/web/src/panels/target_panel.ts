@@ -19,7 +19,7 @@ export function targetPanel(bench: Workbench): HTMLElement {
   const fit = bench.targets;
   const targetGizmo = new TargetGizmo(bench);
   const addTarget = (label: string, place: TargetPlace | null) => {
-    if (!bench.showsPlan) bench.notice.value = "Targets are for the plan's face: go back to the plan, and close the jaw, first.";
+    if (!bench.showsPlan) bench.notice.value = "Targets need the plan's face: go back to the plan and close the jaw first.";
     else if (place === null) bench.notice.value = `${label}: this skin does not move with the bone; choose a point of the face.`;
     else if (fit.targets.value.length >= MAX_TARGETS) bench.notice.value = `There are ${MAX_TARGETS} targets; remove one first.`;
     else targetGizmo.take(fit.targets.value.length, [...fit.targets.value, { label, place, move: bench.moveAt(place), isAlong: false, isChanged: false }]);
@@ -29,7 +29,7 @@ export function targetPanel(bench: Workbench): HTMLElement {
       bench.picking.value = null;
       addTarget(`Point ${fit.targets.value.length + 1}`, anchor === null ? null : placeOfAnchor(bench.file, anchor));
     };
-    bench.picking.value = { prompt: "Click the point of the skin that is to go elsewhere.", kinds: ["skin"], take };
+    bench.picking.value = { prompt: "Click the point of the skin to move.", kinds: ["skin"], take };
   });
   const regions = bench.file.manifest.skinRegions.map(({ number, label }) => ({ value: number, label }));
   const region = select<number>("or a place", [{ value: 0, label: "choose" }, ...regions], (number) => {
@@ -44,7 +44,7 @@ export function targetPanel(bench: Workbench): HTMLElement {
     list.replaceChildren(...targets.map((_, index) => targetItem(bench, targetGizmo, index)));
   });
   return collapsible("Soft-tissue targets", [
-    el("p", { class: "quiet", text: "Choose a point or a place of the skin; pull it by its arrows, or type how far from rest it is to be. Bone moves so that the face comes there." }),
+    el("p", { class: "quiet", text: "Choose a point or region of the skin, drag its arrows, or type its movement from pre-op. The planner computes bone movements that reach it." }),
     el("div", { class: "buttons" }, [point]),
     regions.length === 0 ? null : region.element,
     list,
@@ -112,7 +112,7 @@ function targetItem(bench: Workbench, targetGizmo: TargetGizmo, index: number): 
     input.addEventListener("change", () => {
       const value = parseNumber(input.value, "mm");
       input.setAttribute("aria-invalid", String(value === null));
-      if (value === null) bench.notice.value = `“${input.value}” is no number of millimetres.`;
+      if (value === null) bench.notice.value = `“${input.value}”: enter a number in millimeters.`;
       else targetGizmo.change(index, { move: { ...target().move, [key]: value } });
     });
     return el("span", { class: "target-field" }, [el("label", { text: label, attributes: { for: id } }), input]);
@@ -128,7 +128,7 @@ function targetItem(bench: Workbench, targetGizmo: TargetGizmo, index: number): 
       button("Remove", () => bench.targets.set(others()), { attributes: { "aria-label": `Remove the target for ${label}` } }),
     ]),
     el("div", { class: "target-fields" }, [...fields, el("span", { class: "unit", text: "mm" })]),
-    el("label", { class: "inline" }, [along, "only along this, across it as it will"]),
+    el("label", { class: "inline" }, [along, "Constrain along this direction only"]),
   ]);
 }
 

@@ -17,7 +17,7 @@ export function viewBar(view: HeadView): HTMLElement {
     const isOn = ghost.getAttribute("aria-pressed") !== "true";
     ghost.setAttribute("aria-pressed", String(isOn));
     view.setGhost(isOn);
-  }, { attributes: { "aria-pressed": "false", title: "The face at rest, as a veil" } });
+  }, { attributes: { "aria-pressed": "false", title: "Pre-op face as ghost overlay" } });
   const opacity = slider("Opacity of the skin", { least: 0, most: 1, step: 0.01, value: 1 }, (value) => view.setSkinOpacity(value));
   return el("div", { class: "viewbar", attributes: { role: "toolbar", "aria-label": "View" } }, [
     el("div", { class: "group", attributes: { role: "group", "aria-label": "Look from" } }, views),
@@ -33,7 +33,7 @@ function cutField(view: HeadView): HTMLElement {
   const at = slider("Place of the cut", { least: -reach, most: reach, step: 1, value: 0 }, () => show());
   const show = () => {
     at.disabled = axis === null;
-    at.setAttribute("aria-valuetext", `${formatNumber(at.valueAsNumber, 0)} millimetres from the middle`);
+    at.setAttribute("aria-valuetext", `${formatNumber(at.valueAsNumber, 0)} millimeters from the middle`);
     view.setCut(axis === null ? null : { axis, atMm: at.valueAsNumber });
   };
   const choices = [

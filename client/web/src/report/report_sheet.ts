@@ -39,7 +39,7 @@ export async function reportSheet(bench: Workbench): Promise<HTMLElement> {
     node("section", [node("h2", ["Measures"]), measureTable(bench)], "wide"),
     node("section", [node("h2", ["Profile"]), new ProfileDrawing(bench).draw()]),
     node("section", [node("h2", ["Pictures"]), node("div", pictures, "pictures")]),
-    node("section", [node("h2", ["How it came about"]), facts(bench)], "wide"),
+    node("section", [node("h2", ["Origin"]), facts(bench)], "wide"),
   ], "report");
 }
 
@@ -67,14 +67,14 @@ export function answerLine(bench: Pick<Workbench, "comparison" | "model" | "mode
   const [answer, comparison] = [bench.answer.value, bench.comparison.value];
   const model = bench.modelInfo(modelShown(comparison, bench.model.value))?.name ?? "unknown";
   const isOwn = answer?.by === "page" && (comparison === null || (comparison.share === 0 && comparison.from === "plan"));
-  return `model ${model}. ${describeFace(answer, comparison) || "No answer yet."}${isOwn ? " Given by the page itself; the server has not confirmed it yet." : ""}`;
+  return `model ${model}. ${describeFace(answer, comparison) || "No answer yet."}${isOwn ? " Computed by the page; not yet confirmed by the server." : ""}`;
 }
 
 function facts(bench: Workbench): HTMLElement {
   const lines = [
     `made ${new Date().toISOString()}`,
     answerLine(bench),
-    bench.whyNoBand === "" ? "95 of 100: where it stays if nothing but the material is in doubt; excludes errors of model and surgery" : `no band of uncertainty is known: ${bench.whyNoBand}`,
+    bench.whyNoBand === "" ? "95 % interval, material uncertainty only; excludes model and surgical error" : `no 95 % interval: ${bench.whyNoBand}`,
     "mm and degrees in the head frame: forward, up and the patient's left are positive",
     ...provenanceLines(bench).filter((line) => !line.startsWith("model")),
   ];

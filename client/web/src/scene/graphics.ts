@@ -5,7 +5,7 @@ import * as three from "three";
 
 /** The browser restores a context within some frames, or not at all. */
 const RESTORE_MS = 1500;
-const NOT_BACK = "The browser does not give the graphics card back, so there is no picture: reload the page";
+const NOT_BACK = "The browser does not restore the graphics card, so there is no picture: reload the page";
 
 /**
  * The renderer and the canvas that it draws on, which the browser may take away at any time. The canvas fills `surface`; what listens

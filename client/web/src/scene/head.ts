@@ -121,7 +121,7 @@ export class Head {
     return isSkin && this.skin.clippingPlanes !== null && this.skin.clippingPlanes.length > 0 && this.cutPlane.distanceToPoint(point) < 0;
   }
 
-  /** Three bytes of each vertex of each of `skins`, sRGB; null: the colour of skin. */
+  /** Three bytes of each vertex of each of `skins`, sRGB; null: the color of skin. */
   colorSkin(colors: Uint8Array[] | null): void {
     this.skins.forEach(({ mesh }, index) => {
       const attribute = mesh.geometry.attributes.color as three.BufferAttribute;

@@ -21,7 +21,7 @@ export function cssColor(color: number): string {
   return `#${color.toString(16).padStart(6, "0")}`;
 }
 
-// Light goes around an edge of skin, red further than blue: a wrapped cosine for each colour stands for what scatters below
+// Light goes around an edge of skin, red further than blue: a wrapped cosine for each color stands for what scatters below
 // the surface. Seen along the surface a transparent skin is denser.
 function softenSkin(shader: { fragmentShader: string }): void {
   shader.fragmentShader = shader.fragmentShader

@@ -13,7 +13,7 @@ const MARGIN = 1.08;
 const MOST_PIXEL_RATIO = 2;
 /** A graphics card that is taken away again and again is not waited for without end. */
 const MOST_ATTEMPTS = 3;
-const LOST_AGAIN = "The browser takes the graphics card away again and again, so no picture was made: close other pages with 3D pictures and try again";
+const LOST_AGAIN = "The browser repeatedly loses the graphics card, so no picture was made: close other pages with 3D pictures and try again";
 
 /** What a stage tells its owner. */
 export interface StageListener {

@@ -88,7 +88,7 @@ export class Answers {
   }
 
   private displacements(positions: Float32Array): Float32Array {
-    if (positions.length !== this.rest.length) throw new Error("the answer has another number of vertices than was asked for");
+    if (positions.length !== this.rest.length) throw new Error("the answer has another number of vertices than requested");
     return subtractInto(positions, this.rest, new Float32Array(positions.length));
   }
 
@@ -113,10 +113,10 @@ async function collect(stream: AsyncIterable<ReadPositionsResponse>, total: numb
   let done = 0;
   for await (const { chunk } of stream) {
     const data = chunk?.data ?? new Uint8Array();
-    if (Number(chunk?.offset ?? 0n) !== done || done + data.length > total) throw new Error("the prediction is of another mesh than the case");
+    if (Number(chunk?.offset ?? 0n) !== done || done + data.length > total) throw new Error("the prediction has a different mesh from the case");
     bytes.set(data, done);
     done += data.length;
   }
-  if (done !== total) throw new Error("the prediction is of another mesh than the case");
+  if (done !== total) throw new Error("the prediction has a different mesh from the case");
   return bytes;
 }

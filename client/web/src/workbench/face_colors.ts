@@ -6,10 +6,10 @@ import { VIRIDIS, colorTable, colorize, roundUp } from "../geometry/color_map";
 import { type LargestMovement, largestMovement, largestOf } from "../geometry/largest_movement";
 import type { Head } from "../scene/head";
 
-/** What the colours of a map say. */
+/** What the colors of a map say. */
 export interface MapLegend {
   title: string;
-  /** The map's last colour and all beyond it, in mm. */
+  /** The map's last color and all beyond it, in mm. */
   mostMm: number;
   /** The largest value on the face, in mm. */
   largestMm: number;
@@ -17,7 +17,7 @@ export interface MapLegend {
   band: LargestMovement["band"];
 }
 
-/** A bar of colours as it is drawn: what stands over it, numbers at its ends and in its middle, and below it. */
+/** A bar of colors as it is drawn: what stands over it, numbers at its ends and in its middle, and below it. */
 export interface ShownLegend {
   title: string;
   ticksMm: readonly [number, number, number];
@@ -26,7 +26,7 @@ export interface ShownLegend {
 
 const TABLE = colorTable(VIRIDIS);
 
-/** Lays numbers of mm upon the skin as colours. */
+/** Lays numbers of mm upon the skin as colors. */
 export class FaceColors {
   private readonly values: Float32Array[];
   private readonly bands: Float32Array[];
@@ -39,7 +39,7 @@ export class FaceColors {
     this.colors = head.skins.map((skin) => new Uint8Array(skin.source.positions.length));
   }
 
-  /** The colour of skin. */
+  /** The color of skin. */
   clear(): void {
     if (this.isColored) this.head.colorSkin(null);
     this.isColored = false;

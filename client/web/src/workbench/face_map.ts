@@ -7,7 +7,7 @@ import type { Head } from "../scene/head";
 import { FaceColors, type MapLegend, subtractInto } from "./face_colors";
 import { Signal } from "./signal";
 
-/** What the colours of the skin show. */
+/** What the colors of the skin show. */
 export type MapChoice =
   | { kind: "none" }
   | { kind: "movement" }
@@ -21,7 +21,7 @@ export interface MapSources {
   ofPrediction(prediction: Prediction): Promise<Float32Array>;
 }
 
-/** The colours of the skin: which map, what it compares the face with, and its legend. */
+/** The colors of the skin: which map, what it compares the face with, and its legend. */
 export class FaceMap {
   readonly choice = new Signal<MapChoice>({ kind: "none" });
   readonly legend = new Signal<MapLegend | null>(null);
@@ -68,7 +68,7 @@ export class FaceMap {
     const { colors, other } = this;
     const map = this.choice.value;
     if (map.kind === "movement") return colors.showLengths("Movement of the skin", displacements, uncertainty);
-    if (map.kind === "band" && uncertainty !== null) return colors.showNumbers("Band of 95 in 100 (stiffness only; excludes model and surgical error)", uncertainty);
+    if (map.kind === "band" && uncertainty !== null) return colors.showNumbers("95 % interval (stiffness only; excludes model and surgical error)", uncertainty);
     if ((map.kind === "model" || map.kind === "prediction") && other !== null) {
       const title = map.kind === "model" ? `Difference to ${map.label}` : `Difference to “${map.prediction.title}”`;
       return colors.showLengths(title, subtractInto(displacements, other, new Float32Array(displacements.length)));

@@ -36,7 +36,7 @@ export class NewestAnswer {
    * goes back to older ones. Returns whether it was taken.
    */
   takePicture(picture: Pick<DisplayedFrame, "positions" | "uncertainty" | "posesBehind"> & { frame: Pick<DeformFrame, "refinement" | "refining" | "summary"> }, posesSinceOwn: number): boolean {
-    if (picture.positions.length !== this.rest.length) throw new Error("a picture came that has other vertices than the case");
+    if (picture.positions.length !== this.rest.length) throw new Error("a frame has other vertices than the case");
     if (picture.posesBehind > posesSinceOwn) return false;
     subtractInto(picture.positions, this.rest, this.displacements);
     // What refines an answer comes without a band: it is still that of the same poses.

@@ -121,7 +121,7 @@ function isNewer(entry: Export, known: Export): boolean {
 export function exportText({ state, detail, storedObjects }: Export): string {
   const objects = `${storedObjects} ${storedObjects === 1 ? "object" : "objects"}`;
   if (state === ExportState.WAITING) return detail === "" ? "waiting for the bridge" : `waiting: ${detail}`;
-  if (state === ExportState.CONFIRMATION) return "waits for confirmation in the work list";
+  if (state === ExportState.CONFIRMATION) return "waits for confirmation on the review page";
   if (state === ExportState.STORING) return `storing, ${objects} so far`;
   if (state === ExportState.STORED) return `stored, ${objects}`;
   return detail === "" ? "failed" : `failed: ${detail}`;

@@ -20,7 +20,7 @@ export function describeAnswer(answer: ShownAnswer | null): string {
   const { summary, isRefining } = answer;
   // An estimate has no bound, and what is still iterated has neither.
   if (summary.prepared) return isRefining || summary.errorEstimateMm > 0 ? estimate(summary.errorEstimateMm) : prepared(summary.errorBoundMm);
-  if (isRefining) return "An early answer, of which nobody knows how near it is; a better one follows.";
+  if (isRefining) return "An early answer without an error estimate; a better one follows.";
   if (!summary.converged) return `The full answer was not reached (${formatNumber(100 * summary.load, 0)} % of the move)${summary.obstacle === "" ? "." : `: ${summary.obstacle}.`}`;
   return "Full answer.";
 }
@@ -30,8 +30,8 @@ export function describeFace(answer: ShownAnswer | null, comparison: Comparison 
   if (comparison === null) return describeAnswer(answer);
   const stored = storedFace(comparison);
   if (stored !== null) return `A stored prediction. ${stored.summary === undefined ? "" : describeAnswer({ by: "server", summary: stored.summary, isRefining: false })}`.trim();
-  if (comparison.share > 0) return "Between two faces: no answer of a model.";
-  return comparison.from === "rest" ? "The face at rest." : describeAnswer(answer);
+  if (comparison.share > 0) return "Between two faces: not an answer of a model.";
+  return comparison.from === "rest" ? "Pre-op face." : describeAnswer(answer);
 }
 
 /** The prediction that a comparison shows; null where it shows another face, or what lies between two. */

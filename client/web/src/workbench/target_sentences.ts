@@ -16,15 +16,15 @@ export function targetSentences(response: FitResponse, targets: readonly Pick<Ta
       if (reached) return `${label(name)}: reached, within ${formatNumber(Math.max(missedMm, 0.01), 2)} mm.`;
       return `${label(name)}: cannot be reached; ${formatNumber(missedMm)} mm are missing.`;
     }),
-    ...response.contradictions.map(({ first, second }) => `${label(first)} and ${label(second)} ask different things of the same bone.`),
-    ...(held.length === 0 ? [] : [`Held by its limit${aslant(limitShare)}: ${held.map((number) => numberName(number, handles)).join(", ")}.`]),
-    ...(response.converged ? [] : ["The search has not come to its end; choose a smaller target."]),
+    ...response.contradictions.map(({ first, second }) => `${label(first)} and ${label(second)} conflict: they require different movements of the same bone.`),
+    ...(held.length === 0 ? [] : [`At its limit${aslant(limitShare)}: ${held.map((number) => numberName(number, handles)).join(", ")}.`]),
+    ...(response.converged ? [] : ["The search did not converge; choose a smaller target."]),
   ];
 }
 
 /** What is asked for goes no further than this part of a limit; what is moved by hand does. */
 function aslant(limitShare: number): string {
-  return limitShare > 0.995 ? "" : ` (the head lies aslant in the scan: the search goes to ${formatNumber(100 * limitShare, 0)} % of the case’s limits)`;
+  return limitShare > 0.995 ? "" : ` (the head is oblique in the scan: the search uses ${formatNumber(100 * limitShare, 0)} % of the case’s limits)`;
 }
 
 const SHIFTS = ["to the left", "to the back", "up"];

@@ -80,7 +80,7 @@ export class Workbench implements ShownFace {
   readonly model = new Signal<DeformationModel>(0);
   readonly comparison = new Signal<Comparison | null>(null);
   readonly penetrations = new Signal<Penetration[]>([]);
-  /** Teeth alone are shown, coloured by this legend; null: the whole head. */
+  /** Teeth alone are shown, colored by this legend; null: the whole head. */
   readonly bite = new Signal<ShownLegend | null>(null);
   /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
   readonly picking = new Signal<Picking | null>(null);
@@ -195,9 +195,9 @@ export class Workbench implements ShownFace {
 
   /** Of what is shown, in words; empty where there is one, or none yet. */
   get whyNoBand(): string {
-    if (!this.hasBand) return "this model or case tells none";
+    if (!this.hasBand) return "this model or case has none";
     const turnsTooFar = Array.from(this.shownPoses.values()).some(({ rotationVector }) => Math.hypot(...rotationVector) > LARGEST_BAND_ROTATION);
-    return this.shownBand === null && turnsTooFar ? "a segment turns by more than 30 degrees, which linear elasticity takes for strain" : "";
+    return this.shownBand === null && turnsTooFar ? "a segment turns by more than 30 degrees, which linear elasticity treats as strain" : "";
   }
 
   async compare(comparison: Comparison | null): Promise<void> {
@@ -237,7 +237,7 @@ export class Workbench implements ShownFace {
     this.planChanged(degrees === 0);
   }
 
-  /** Teeth alone, with this legend of their colours; null: all. */
+  /** Teeth alone, with this legend of their colors; null: all. */
   showBite(legend: ShownLegend | null): void {
     this.bite.value = legend;
     this.view.head.setTeethOnly(legend !== null);

@@ -68,7 +68,7 @@ test("where no connection brings anything the reason is told", async () => {
     await settle();
     clock.pass(30);
   }
-  expect(await read).toBe("nothing has come from the server for 30 s");
+  expect(await read).toBe("no data from the server for 30 s");
 });
 
 test("progress is told in megabytes and percent", () => {

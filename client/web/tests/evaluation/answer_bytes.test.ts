@@ -23,7 +23,7 @@ function changed(name: string, change: (view: DataView, bytes: Uint8Array) => vo
 }
 
 describe.each(GOLDEN)("%s", (name) => {
-  test("is refused wherever it is cut off", () => {
+  test("is refused wherever it is truncated", () => {
     const bytes = goldenBytes(name);
     for (let length = 0; length < bytes.length; length += 16 + Math.floor(bytes.length / 200)) {
       expect(() => readAnswers(bytes.slice(0, length))).toThrow(AnswersError);
@@ -50,9 +50,9 @@ describe.each(GOLDEN)("%s", (name) => {
 
 test.each([
   ["too large", goldenBytes("linear_elastic"), 1000, "prepared answers of 38432 bytes; at most 1000 are read"],
-  ["something else", new TextEncoder().encode("something else, and long enough"), undefined, "the bytes do not begin as prepared answers do"],
+  ["something else", new TextEncoder().encode("something else, and long enough"), undefined, "these are not prepared answers"],
   ["a later version", changed("linear_elastic", (view) => view.setUint32(8, 3, true)), undefined, "prepared answers of version 3; this reader knows 1 to 2"],
-  ["too many sections", changed("linear_elastic", (view) => view.setUint32(12, 1001, true)), undefined, "prepared answers are cut off or damaged; fetch them again"],
+  ["too many sections", changed("linear_elastic", (view) => view.setUint32(12, 1001, true)), undefined, "prepared answers are incomplete or damaged; fetch them again"],
   ["no number", changed("gradient_field", (view, bytes) => view.setFloat64(offsetOf(bytes, 20), NaN, true)), undefined, "a value of the prepared answers is not finite"],
   ["endless", changed("linear_elastic", (view, bytes) => view.setFloat64(offsetOf(bytes, 24), Infinity, true)), undefined, "a value of the prepared answers is not finite"],
   ["an unknown handle", changed("linear_elastic", (view, bytes) => view.setInt32(offsetOf(bytes, 2), 2, true)), undefined, "regions and rest positions do not fit together"],
@@ -67,5 +67,5 @@ test("bytes of another hash are refused", async () => {
   const bytes = goldenBytes("linear_elastic");
   const sha256 = createHash("sha256").update(bytes).digest("hex");
   await expect(makeEvaluator(bytes, { sha256 })).resolves.toBeDefined();
-  await expect(makeEvaluator(bytes, { sha256: sha256.replace(/^./, (digit) => (digit === "0" ? "1" : "0")) })).rejects.toThrow("another SHA-256 than was told");
+  await expect(makeEvaluator(bytes, { sha256: sha256.replace(/^./, (digit) => (digit === "0" ? "1" : "0")) })).rejects.toThrow("announced SHA-256");
 });

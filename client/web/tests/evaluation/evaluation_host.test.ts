@@ -152,8 +152,8 @@ test("a worker that does not start is done without", async () => {
 });
 
 test.each([
-  ["cut off", BYTES.slice(0, 5000), createHash("sha256").update(BYTES.slice(0, 5000)).digest("hex"), "cut off or damaged"],
-  ["of another hash", BYTES, SHA256.replace(/^../, "zz"), "another SHA-256"],
+  ["cut off", BYTES.slice(0, 5000), createHash("sha256").update(BYTES.slice(0, 5000)).digest("hex"), "incomplete or damaged"],
+  ["of another hash", BYTES, SHA256.replace(/^../, "zz"), "announced SHA-256"],
 ])("bytes that are %s are refused, by a worker and without", async (_what, bytes, sha256, words) => {
   const worker = new FakeWorker(0);
   await expect(makeHost(bytes, sha256, listener().listening, () => worker)).rejects.toThrow(words);

@@ -53,7 +53,7 @@ test("a plan that the answers do not reach is refused in a sentence that names a
   const fetched = vi.fn();
   vi.stubGlobal("fetch", fetched);
   expect([CASES[1].isCovered, CASES[7].isCovered]).toEqual([true, false]);
-  await expect(movingFile(await file(), neoHookean(7), "")).rejects.toThrow(/would never show it: choose Linear elastic/);
+  await expect(movingFile(await file(), neoHookean(7), "")).rejects.toThrow(/could not show it: choose Linear elastic/);
   await expect(movingFile(await file(), { ...neoHookean(7), model: "linear_elastic" }, "")).rejects.toThrow("choose Gradient field");
   expect(fetched).not.toHaveBeenCalled();
 });

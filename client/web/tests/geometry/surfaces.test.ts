@@ -152,7 +152,7 @@ describe("the colour map", () => {
   });
 });
 
-/** CIE L*a*b* of an sRGB colour. */
+/** CIE L*a*b* of an sRGB color. */
 function lab(...rgb: number[]): [number, number, number] {
   const [r, g, b] = rgb.map((byte) => (byte / 255 <= 0.04045 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4));
   const f = (t: number) => (t > 0.008856 ? Math.cbrt(t) : 7.787 * t + 16 / 116);

@@ -200,7 +200,7 @@ test("a worker that ends by itself leaves the server to answer until it is asked
   await answers.follow(configuration());
   expect(states[states.length - 1]).toMatchObject({ kind: "ready", place: "worker" });
   endings[0]();
-  expect(states[states.length - 1]).toMatchObject({ kind: "failed", text: expect.stringContaining("has ended") });
+  expect(states[states.length - 1]).toMatchObject({ kind: "failed", text: expect.stringContaining("worker stopped") });
   expect([answers.heldColumns, await answers.bandAt(CASES[1].poses)]).toEqual([null, null]);
   answers.resume();
   await expect.poll(() => states[states.length - 1]).toMatchObject({ kind: "ready" });
@@ -212,5 +212,5 @@ test("damaged columns are told in a sentence, and the server answers", async () 
   await answers.follow(configuration());
   answers.ask(CASES[1].poses);
   expect(firsts).toEqual([]);
-  expect(last()).toMatchObject({ kind: "failed", text: expect.stringContaining("cut off or damaged") });
+  expect(last()).toMatchObject({ kind: "failed", text: expect.stringContaining("incomplete or damaged") });
 });

@@ -167,7 +167,7 @@ test("an answer counts once, and only in the tab that asked", async () => {
   provider.answers.push(tokens("two"));
   tab.address = "https://planner.example.org/?code=c&state=s";
   const { login, bearer } = await load();
-  expect(login.state).toMatchObject({ kind: "out", problem: expect.stringContaining("begun no login") });
+  expect(login.state).toMatchObject({ kind: "out", problem: expect.stringContaining("No login was started") });
   expect(bearer.token).toBe("");
   expect(tab.address).toBe("https://planner.example.org/");
 });

@@ -49,7 +49,7 @@ test("a provider of another name is named, and so is the one that is expected", 
 test("a provider for all tenants is told from another provider", async () => {
   const sentence = await said(undefined, { issuer: "https://login.example.org/{tenantid}/v2.0" });
   expect(sentence).toContain("{tenantid}");
-  expect(sentence).toContain("must name your own tenant");
+  expect(sentence).toContain("to your own tenant");
 });
 
 test("an ID token of another issuer names both", async () => {
@@ -59,7 +59,7 @@ test("an ID token of another issuer names both", async () => {
 
 test.each([
   ["exp", -300, /ended 30\d s ago/],
-  ["nbf", 300, /begins in (300|299) s/],
+  ["nbf", 300, /becomes valid in (300|299) s/],
 ])("a clock that is off by 5 minutes is a sentence about clocks (%s)", async (claim, offset, told) => {
   const sentence = await said(undefined, { claims: { [claim]: seconds() + offset } });
   expect(sentence).toMatch(told);

@@ -63,8 +63,8 @@ test("landmarks that are missing are named, in the order of the definition", () 
 test.each<[string, Record<string, Partial<FacePoint>>, string]>([
   ["e_line_upper_lip", { pronasale: { forward: -12 } }, "no nose"],
   ["e_line_lower_lip", { pronasale: { up: -45 } }, "one below the other"],
-  ["nasolabial_angle", { columella: { forward: 0, up: -10 } }, "lie on each other"],
-  ["occlusal_cant", { upper_molar_left: { left: -30 } }, "exchanged"],
+  ["nasolabial_angle", { columella: { forward: 0, up: -10 } }, "coincide"],
+  ["occlusal_cant", { upper_molar_left: { left: -30 } }, "swapped"],
 ])("%s of a degenerate profile is refused in a sentence", (name, changes, text) => {
   const result = measure(name, { before: changed(changes) });
   expect(result).toMatchObject({ kind: "impossible", text: expect.stringContaining(text) });

@@ -11,15 +11,15 @@ const READY: Ready = { kind: "ready", place: "page", hasWorkers: true, kernel: "
 test.each<[string, Partial<Ready>, string]>([
   ["nothing lacks", {}, "This page answers at once; the server confirms."],
   ["no WebAssembly", { kernel: "javascript" }, "This page answers at once (without WebAssembly: slower); the server confirms."],
-  ["no workers", { hasWorkers: false }, "This page answers at once (without a thread of its own: slower); the server confirms."],
-  ["neither", { hasWorkers: false, kernel: "javascript" }, "This page answers at once (without WebAssembly, without a thread of its own: slower); the server confirms."],
-  ["beyond the columns", { coverage: "beyond" }, "Beyond what was prepared: the server answers."],
+  ["no workers", { hasWorkers: false }, "This page answers at once (without a background thread: slower); the server confirms."],
+  ["neither", { hasWorkers: false, kernel: "javascript" }, "This page answers at once (without WebAssembly, without a background thread: slower); the server confirms."],
+  ["beyond the columns", { coverage: "beyond" }, "Outside the prepared range: the server answers."],
 ])("who answers the hand: %s", (_, change, text) => {
   expect(describeLocal({ ...READY, ...change })).toBe(text);
 });
 
 test("the largest movement is told with its band where that is known", () => {
-  expect(largestText({ largestMm: 8.123, band: { lowestMm: 7.5, highestMm: 8.8 } })).toBe("largest 8.12 mm, in 95 of 100 cases 7.50 to 8.80");
+  expect(largestText({ largestMm: 8.123, band: { lowestMm: 7.5, highestMm: 8.8 } })).toBe("largest 8.12 mm, 95 % interval 7.50 to 8.80");
   expect(largestText({ largestMm: 8.123, band: null })).toBe("largest 8.12 mm");
 });
 

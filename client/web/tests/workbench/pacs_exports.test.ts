@@ -95,7 +95,7 @@ test("a refusal is told", async () => {
 
 test.each([
   ["waiting for the bridge", ExportState.WAITING, "", true, false],
-  ["waits for confirmation in the work list", ExportState.CONFIRMATION, "", true, false],
+  ["waits for confirmation on the review page", ExportState.CONFIRMATION, "", true, false],
   ["storing, 3 objects so far", ExportState.STORING, "", false, false],
   ["stored, 3 objects", ExportState.STORED, "", false, false],
   ["failed: the PACS refuses it", ExportState.FAILED, "the PACS refuses it", false, true],

@@ -18,7 +18,7 @@ test.each<[string, ShownAnswer | null, string]>([
   ["prepared", PREPARED, "Prepared answer, within 0.03 mm of the full one."],
   ["refining", server({ prepared: true, errorEstimateMm: 0.42 }, true), "Estimate, within about 0.42 mm; the full answer follows."],
   ["an estimate that nothing refines", server({ prepared: true, errorEstimateMm: 0.42 }), "Estimate, within about 0.42 mm; the full answer follows."],
-  ["still iterated", server({ converged: true, load: 1 }, true), "An early answer, of which nobody knows how near it is; a better one follows."],
+  ["still iterated", server({ converged: true, load: 1 }, true), "An early answer without an error estimate; a better one follows."],
   ["not converged", server({ load: 0.6, obstacle: "the chin meets the upper lip" }), "The full answer was not reached (60 % of the move): the chin meets the upper lip."],
   ["not converged, nobody knows why", server({ load: 1 }), "The full answer was not reached (100 % of the move)."],
   ["full", server({ converged: true, load: 1 }), "Full answer."],
@@ -35,6 +35,6 @@ test("a comparison is told by the face that it shows", () => {
   expect(text("plan", 1)).toBe("A stored prediction. The full answer was not reached (50 % of the move).");
   expect(text(other, 0)).toBe("A stored prediction.");
   expect(text("plan", 0)).toBe(describeAnswer(PREPARED));
-  expect(text("rest", 0)).toBe("The face at rest.");
-  expect(text("plan", 0.5)).toBe("Between two faces: no answer of a model.");
+  expect(text("rest", 0)).toBe("Pre-op face.");
+  expect(text("plan", 0.5)).toBe("Between two faces: not an answer of a model.");
 });

@@ -23,7 +23,7 @@ test("targets that contradict each other are told by their names, as is what eac
     "Chin: cannot be reached; 2.3 mm are missing.",
     "Lower lip: cannot be reached; 1.5 mm are missing.",
     "Upper lip: reached, within 0.01 mm.",
-    "Chin and Lower lip ask different things of the same bone.",
+    "Chin and Lower lip conflict: they require different movements of the same bone.",
   ]);
 });
 
@@ -35,6 +35,6 @@ test("what is held by its limit, and a search that did not end, are told last", 
       { handle: "mandible", isRotation: true, axis: 0, bound: FitBound.UNSPECIFIED },
     ],
   });
-  expect(targetSentences(response, TARGETS, HANDLES, 1)).toEqual(["Held by its limit: Lower jaw to the back.", "The search has not come to its end; choose a smaller target."]);
-  expect(targetSentences(response, TARGETS, HANDLES, 0.8)[0]).toBe("Held by its limit (the head lies aslant in the scan: the search goes to 80 % of the case’s limits): Lower jaw to the back.");
+  expect(targetSentences(response, TARGETS, HANDLES, 1)).toEqual(["At its limit: Lower jaw to the back.", "The search did not converge; choose a smaller target."]);
+  expect(targetSentences(response, TARGETS, HANDLES, 0.8)[0]).toBe("At its limit (the head is oblique in the scan: the search uses 80 % of the case’s limits): Lower jaw to the back.");
 });

@@ -118,7 +118,7 @@ TEST_F(DeviceLoginTest, AProviderOfAnotherNameIsNamedWithTheExpectedOne) {
   EXPECT_THAT(std::string(Run().status().message()),
               HasSubstr("https://a/{tenantid}/v2.0, which stands for every tenant"));
   answers_ = {HttpAnswer{200, R"({"issuer": "https://\u001b[2J"})"}};
-  EXPECT_THAT(std::string(Run().status().message()), HasSubstr("names no issuer"));
+  EXPECT_THAT(std::string(Run().status().message()), HasSubstr("does not name an issuer"));
 }
 
 struct BadAnswer {

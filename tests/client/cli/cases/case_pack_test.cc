@@ -148,7 +148,7 @@ TEST_F(CasePackTest, SurfacesOfAnotherMeshAreRefused) {
   const std::string plan = CopyOf("bar");
   std::filesystem::copy(TestDataPath("plans/head/viewer.glb"), Path("bar/viewer.glb"));
   EXPECT_THAT(Run({"case", "pack", plan, "--out", "packed.tfcase"}),
-              FailsWith(1, HasSubstr("belongs to another mesh")));
+              FailsWith(1, HasSubstr("belongs to a different mesh")));
   EXPECT_FALSE(std::filesystem::exists(Path("packed.tfcase")));
 }
 

@@ -77,7 +77,7 @@ TEST_F(CaseRenderTest, APositionThatIsNoNumberIsRefused) {
   ASSERT_FALSE(positions.empty());
   positions.replace(0, 4, "\xff\xff\xff\xff");
   Write("after.f32", positions);
-  EXPECT_THAT(Render(), FailsWith(1, HasSubstr("no number")));
+  EXPECT_THAT(Render(), FailsWith(1, HasSubstr("not a number")));
 }
 
 TEST_F(CaseRenderTest, AFolderThatHoldsSomethingIsLeftAlone) {

@@ -152,7 +152,7 @@ TEST_F(MeshCheckTest, ASurfaceSaysInWhichSpaceItsFileStatesToBe) {
   EXPECT_THAT(Run({"mesh", "check", "lps.stl"}).out, HasSubstr("LPS, as the file states"));
   for (const char* file : {"unstated.stl", "unknown.stl"}) {
     EXPECT_THAT(Run({"mesh", "check", file}).out,
-                HasSubstr("taken as LPS; the file states neither LPS nor RAS"));
+                HasSubstr("assumed to be LPS; the file states neither LPS nor RAS"));
   }
   EXPECT_THAT(Run({"mesh", "check", "ras.stl", "--json"}).out,
               HasSubstr("\"stated_space\": \"RAS\""));

@@ -139,8 +139,8 @@ TEST_F(PlanBuildTest, PlanThatMissesARequirementIsKeptAndNotReady) {
   const ProcessResult refused = Build();
   EXPECT_THAT(refused,
               FailsWith(1, AllOf(HasSubstr("the plan in head is not ready"),
-                                 HasSubstr("% in the skin without a name"),
-                                 HasSubstr("in the chin"), HasSubstr("--accept-defects"))));
+                                 HasSubstr("% in the unnamed skin"), HasSubstr("in the chin"),
+                                 HasSubstr("--accept-defects"))));
   EXPECT_THAT(refused.out, AllOf(HasSubstr("NOT ready"), Not(HasSubstr("plan is ready"))));
   EXPECT_EQ(nlohmann::json::parse(Read("head/report.json"))["ready"], false);
   EXPECT_THAT(AllFiles("head"), ElementsAre("head.vtu", "plan.json", "report.html", "report.json",
@@ -233,7 +233,7 @@ TEST_F(PlanBuildTest, UnusableCtIsRefused) {
   std::filesystem::create_directory(folder_ / "empty");
   EXPECT_THAT(BuildFrom("no_such_ct"), FailsWith(1, HasSubstr("no such file or folder")));
   EXPECT_THAT(BuildFrom("empty"), FailsWith(1, HasSubstr("the folder is empty")));
-  EXPECT_THAT(BuildFrom("recipe.json"), FailsWith(1, HasSubstr("no DICOM file")));
+  EXPECT_THAT(BuildFrom("recipe.json"), FailsWith(1, HasSubstr("not a DICOM file")));
   Write("recipe.json", Recipe(R"("ct": {"axes": "RPI"}, )"));
   EXPECT_THAT(Build(), FailsWith(1, HasSubstr("\"hu_offset\": -1024")));
   EXPECT_THAT(Files(), ElementsAre("empty", "recipe.json"));

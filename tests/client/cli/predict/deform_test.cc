@@ -111,7 +111,7 @@ TEST_F(DeformTest, RangesOfThePlanGiveElasticResultsABand) {
     const Attribute* along = FindAttribute(result.point_data, "material_uncertainty_normal_p95_mm");
     ASSERT_EQ(band != nullptr && along != nullptr, is_elastic);
     if (!is_elastic) {
-      EXPECT_THAT(run.out, HasSubstr("not told; linear_elastic and neo_hookean tell"));
+      EXPECT_THAT(run.out, HasSubstr("only for linear_elastic and neo_hookean"));
       EXPECT_THAT(run.err, IsEmpty());
       continue;
     }

@@ -42,9 +42,9 @@ TEST_F(UploadLinesTest, WhatHappenedIsSaidAtOnce) {
   options_.on_resumed(1'500'000, 3'000'000);
   options_.on_interrupted(absl::UnavailableError("nobody is there"));
   options_.on_resumed(0, 3'000'000);
-  EXPECT_THAT(lines_, ElementsAre("the upload goes on: the server has 1.5 of 3.0 MB already",
-                                  "the upload is interrupted (nobody is there); trying again",
-                                  "the upload begins anew"));
+  EXPECT_THAT(lines_, ElementsAre("the upload continues: the server has 1.5 of 3.0 MB already",
+                                  "upload interrupted (nobody is there); trying again",
+                                  "the upload restarts"));
 }
 
 TEST_F(UploadLinesTest, AttemptsThatFailAlikeAreNotAllTold) {
@@ -53,10 +53,10 @@ TEST_F(UploadLinesTest, AttemptsThatFailAlikeAreNotAllTold) {
     options_.on_resumed(1'500'000, 3'000'000);
   }
   options_.on_interrupted(absl::UnavailableError("nobody is there"));
-  const std::string waits = "the upload is interrupted (another client sends); trying again";
-  const std::string goes_on = "the upload goes on: the server has 1.5 of 3.0 MB already";
+  const std::string waits = "upload interrupted (another client sends); trying again";
+  const std::string goes_on = "the upload continues: the server has 1.5 of 3.0 MB already";
   EXPECT_THAT(lines_, ElementsAre(waits, goes_on, waits, goes_on,
-                                  "the upload is interrupted (nobody is there); trying again"));
+                                  "upload interrupted (nobody is there); trying again"));
 }
 
 }  // namespace

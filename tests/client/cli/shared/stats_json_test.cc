@@ -28,9 +28,9 @@ TEST(StatsJsonTest, AnAnswerThatHasNotConvergedSaysWhy) {
   solve.iterations = 500;
   solve.residual = 0.5;
   solve.gave_up = Termination::kNoRoom;
-  EXPECT_EQ(NotReachedText(solve),
-            "not converged after 500 iterations (residual 0.5): no memory for the second factor "
-            "that it needs");
+  EXPECT_EQ(
+      NotReachedText(solve),
+      "not converged after 500 iterations (residual 0.5): out of memory for the second factor");
 }
 
 }  // namespace

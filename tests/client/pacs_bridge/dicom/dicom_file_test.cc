@@ -127,14 +127,14 @@ TEST(DicomFile, WhatIsNoDicomFileIsRefused) {
   EXPECT_THAT(LoadDicomHeader(folder / "none").status(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("there is no such file")));
   EXPECT_THAT(LoadDicomHeader(folder).status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("it is no file")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("it is not a file")));
   WriteTestFile(folder / "text", "DICM? no.");
   EXPECT_THAT(LoadDicomHeader(folder / "text").status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no DICOM file")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a DICOM file")));
   const CtSeries series = OneSlice(folder);
   WriteTestFile(folder / "cut", BytesOf(series.files[0]).substr(0, 700));
   EXPECT_THAT(LoadDicomHeader(folder / "cut").status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("damaged or cut off")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("damaged, truncated")));
   EXPECT_THAT(LoadDicomHeader(series.files[0], {.max_file_bytes = 1000}).status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("more than the 1000")));
 }
@@ -155,7 +155,7 @@ TEST(DicomFile, ItemsWithinItemsEndAtALimitAndNotWithTheStack) {
   // As deep as the limit lets it: the stack holds that.
   WriteTestFile(folder / "deep", nested.substr(0, dataset + 4090 * open.size()));
   EXPECT_THAT(LoadDicomHeader(folder / "deep").status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("damaged or cut off")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("damaged, truncated")));
 }
 
 TEST(DicomFile, WhatIsDeflatedIsRefused) {

@@ -60,8 +60,8 @@ TEST_F(InstanceFolderTest, WhatIsNotAsAnnouncedIsRefusedAndGone) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("another object or class")));
   EXPECT_THAT(Take(bytes, {.class_uid = "1.2.3"}).status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("another object or class")));
-  EXPECT_THAT(Take("no DICOM", {}).status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no DICOM file")));
+  EXPECT_THAT(Take("not a DICOM", {}).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a DICOM file")));
   EXPECT_TRUE(fs::is_empty(path_));
   EXPECT_THAT(sink_.instances(), IsEmpty());
 }

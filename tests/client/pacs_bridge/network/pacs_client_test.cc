@@ -430,7 +430,7 @@ TEST(PacsClient, PeersThatCannotBeAreTold) {
   PacsPeer peer;
   peer.name = "p";
   EXPECT_THAT(MakePacsClient(peer).status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("1 to 16 characters")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("1 to 16 ASCII characters")));
   peer.ae_title = "P";
   EXPECT_THAT(MakePacsClient(peer).status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("a host and a port")));

@@ -170,7 +170,7 @@ TEST_F(StorageReceiverTest, AtTheWatermarkTheSenderIsToldThatThereIsNoRoom) {
   const auto ends = sink_.WaitForEnds(1);
   ASSERT_THAT(ends, SizeIs(1));
   EXPECT_EQ(ends[0].kept, 0);
-  EXPECT_THAT(ends[0].problem, HasSubstr("make room"));
+  EXPECT_THAT(ends[0].problem, HasSubstr("free some space"));
   EXPECT_THAT(Received(), IsEmpty());
 }
 
@@ -358,11 +358,11 @@ TEST(StorageReceiver, OptionsThatCannotBeAreTold) {
   EXPECT_THAT(started({.addresses = {"pacs.example"}}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("write 10.1.2.3")));
   EXPECT_THAT(started({.ae_title = "SEVENTEENLETTERS!"}),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("1 to 16 characters")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("1 to 16 ASCII characters")));
   EXPECT_THAT(started({.calling_ae_titles = {"SCANNER", "A\\B"}}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("without a backslash")));
   EXPECT_THAT(started({.address = "nowhere"}),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("to listen at")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("address and port")));
   const auto first = StorageReceiver::Start({}, folder->get(), &sink);
   ASSERT_THAT(first.status(), IsOk());
   EXPECT_THAT(

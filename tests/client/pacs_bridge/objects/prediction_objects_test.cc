@@ -255,7 +255,7 @@ TEST_F(PredictionObjectsTest, BadInputIsRefusedByName) {
   EXPECT_THAT(Refusal(bad).message(), HasSubstr("the UID of \"capture\""));
   bad = good;
   bad.uids["report"] = bad.uids["capture"];
-  EXPECT_THAT(Refusal(bad).message(), HasSubstr("that of another object"));
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("to another object"));
   bad = good;
   bad.source_images.clear();
   EXPECT_THAT(Refusal(bad).message(), HasSubstr("0 source images"));
@@ -267,28 +267,28 @@ TEST_F(PredictionObjectsTest, BadInputIsRefusedByName) {
   EXPECT_THAT(Refusal(bad).message(), HasSubstr("a unit other than"));
   bad = good;
   bad.measures[0].set_after(std::numeric_limits<double>::infinity());
-  EXPECT_THAT(Refusal(bad).message(), HasSubstr("a number that is none"));
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("an invalid number"));
   bad = good;
   bad.prediction.clear_poses();
-  EXPECT_THAT(Refusal(bad).message(), HasSubstr("no pose of the handle"));
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("no pose for the handle"));
   bad = good;
   bad.pictures.push_back(MakePicture(4, 32));
-  EXPECT_THAT(Refusal(bad).message(), HasSubstr("another size"));
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("its size differs"));
   bad = good;
   bad.pictures = {MakePicture(5, 2049, 1)};
   EXPECT_THAT(Refusal(bad).message(), HasSubstr("more than 2048 pixels"));
   bad = good;
   std::filesystem::resize_file(MakePicture(6), 200);
   bad.pictures[2] = folder_ / "picture6.png";
-  EXPECT_THAT(Refusal(bad).message(), HasSubstr("damaged or cut off"));
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("damaged or truncated"));
   bad.pictures[2] = folder_ / "nowhere.png";
   EXPECT_THAT(Refusal(bad).message(), HasSubstr("no such picture"));
   bad = good;
   bad.pictures.back() = bad.source_header;
-  EXPECT_THAT(Refusal(bad).message(), HasSubstr("no PNG"));
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("not a readable PNG"));
   bad = good;
   bad.source_header = bad.pictures[0];
-  EXPECT_THAT(Refusal(bad).message(), HasSubstr("no DICOM file"));
+  EXPECT_THAT(Refusal(bad).message(), HasSubstr("not a DICOM file"));
 }
 
 TEST_F(PredictionObjectsTest, ASourceWithoutAFrameOfReferenceIsRefused) {

@@ -18,7 +18,7 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-// The work list as curl sees it.
+// The review page as curl sees it.
 namespace tissueform {
 namespace {
 

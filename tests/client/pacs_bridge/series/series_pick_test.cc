@@ -121,12 +121,12 @@ INSTANTIATE_TEST_SUITE_P(
         Defect{"MissingSlices", [](Images* i) { i->erase(i->begin() + 9, i->begin() + 12); },
                "3 slices are missing"},
         Defect{"DuplicateSlices", [](Images* i) { i->push_back(i->front()); },
-               "1 images lie where another one lies"},
+               "1 images have the position of another one"},
         Defect{"MixedFrames", [](Images* i) { i->back().frame_uid = "9"; },
                "2 frames of reference"},
         Defect{"MixedOrientations",
                [](Images* i) { i->back().axes->col(1) = Eigen::Vector3d::UnitZ(); },
-               "turned differently"},
+               "different orientations"},
         Defect{"Few", [](Images* i) { i->resize(20); }, "it has 20 slices, fewer than 60"},
         Defect{"Thick", [](Images* i) { i->front().slice_thickness_mm = 5; }, "5.00 mm thick"},
         Defect{"Scout",
@@ -144,7 +144,7 @@ INSTANTIATE_TEST_SUITE_P(
                    image.position.reset();
                  }
                },
-               "several frames each (Enhanced CT)"},
+               "multi-frame (Enhanced CT)"},
         Defect{"Derived", [](Images* i) { i->front().image_type = "DERIVED\\SECONDARY"; },
                "derived"},
         Defect{"Magnetic", [](Images* i) { i->front().modality = "MR"; }, "no Hounsfield units"},
@@ -182,7 +182,7 @@ TEST_P(StrangerTest, InASeriesOfCtSlicesIsLeftAsideWithANote) {
     const SeriesVerdict verdict = PickSeries({facts}, {SomeRule()}).front();
     EXPECT_TRUE(verdict.chosen);
     EXPECT_THAT(verdict.reason, HasSubstr("200 axial slices"));
-    EXPECT_THAT(verdict.reason, HasSubstr("left aside: 1 other object"));
+    EXPECT_THAT(verdict.reason, HasSubstr("ignored: 1 other object"));
   }
 }
 
@@ -222,7 +222,7 @@ TEST(SeriesFactsTest, WithoutCtSlicesTheMostFrequentKindCounts) {
     MakeCapture(&images->front());
   });
   EXPECT_EQ(facts.set_aside, 1);
-  EXPECT_THAT(WhatIsAgainst(facts, SomeRule()), HasSubstr("modality MR"));
+  EXPECT_THAT(WhatIsAgainst(facts, SomeRule()), HasSubstr("modality is MR"));
 }
 
 TEST(PickSeriesTest, TheSofterKernelWinsAndTheOtherIsToldWhy) {
@@ -232,7 +232,7 @@ TEST(PickSeriesTest, TheSofterKernelWinsAndTheOtherIsToldWhy) {
   const std::vector<SeriesVerdict> verdicts =
       PickSeries({sharp, FactsOfSeries("soft", Head())}, {SomeRule()});
   EXPECT_FALSE(verdicts[0].chosen);
-  EXPECT_EQ(verdicts[0].reason, "the chosen one has a softer kernel");
+  EXPECT_EQ(verdicts[0].reason, "the chosen series has a softer kernel");
   EXPECT_TRUE(verdicts[1].chosen);
   EXPECT_THAT(verdicts[1].reason, HasSubstr("by rule \"head\": 200 axial slices"));
 }

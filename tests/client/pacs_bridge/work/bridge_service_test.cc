@@ -189,7 +189,7 @@ TEST_F(BridgeServiceTest, WhatWasTakenBackIsLookedFor) {
   server_->taken_back = {"exports/2"};
   slow_.LetGo();
   const auto service = Serve();
-  EXPECT_TRUE(log_.WaitFor("exports/2 is asked for no longer"));
+  EXPECT_TRUE(log_.WaitFor("exports/2 was withdrawn"));
   EXPECT_EQ(exports_.List()->size(), 1);
 }
 

@@ -74,7 +74,7 @@ class FolderCaseServer : public CaseServer {
                             const std::string& detail, int stored) override {
     TF_RETURN_IF_ERROR(away);
     if (!MayFollow(StateOf(name), static_cast<ExportState>(state))) {
-      return absl::InvalidArgumentError("the state does not follow the one that it has");
+      return absl::InvalidArgumentError("invalid change of state");
     }
     AppendLine(folder_ / "updates",
                absl::StrCat(name, " ", v1::ExportState_Name(state), " ", stored, " ", detail));

@@ -191,7 +191,8 @@ TEST_F(ExportWorkTest, AStudyThatWasDeletedIsToldAndNothingIsStored) {
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFailed);
   EXPECT_TRUE(Stored().empty());
-  EXPECT_THAT(Updates(), Contains(HasSubstr("FAILED 0 the PACS has the series of this case no")));
+  EXPECT_THAT(Updates(),
+              Contains(HasSubstr("FAILED 0 the PACS no longer has the series of this case")));
 }
 
 TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
@@ -206,7 +207,7 @@ TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
   EXPECT_THAT(exports_.Get("exports/1")->note, HasSubstr("another patient ID"));
   EXPECT_THAT(exports_.Get("exports/1")->note, Not(HasSubstr("MERGED-1")));
   EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "MERGED-1");
-  EXPECT_THAT(Updates(), ::testing::ElementsAre(HasSubstr("CONFIRMATION 0 waits for a person"),
+  EXPECT_THAT(Updates(), ::testing::ElementsAre(HasSubstr("CONFIRMATION 0 waits for confirmation"),
                                                 HasSubstr("CONFIRMATION 0 the patient's data")));
   EXPECT_TRUE(Stored().empty());
   Confirm("exports/1");
@@ -280,7 +281,7 @@ TEST_F(NoHeaderTest, AMergedPatientGoesBackToThePersonAndNothingIsStoredWithTheO
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
   EXPECT_THAT(exports_.Get("exports/1")->note,
-              ::testing::AllOf(HasSubstr("another patient ID"), HasSubstr("gives no header"),
+              ::testing::AllOf(HasSubstr("another patient ID"), HasSubstr("returns no header"),
                                Not(HasSubstr("MERGED-1"))));
   EXPECT_EQ(rows_.GetStudy(series_.study_uid)->patient.id, "MERGED-1");
   Confirm("exports/1");
@@ -294,15 +295,16 @@ TEST_F(NoHeaderTest, AHeaderThatIsTooOldStandsForNothing) {
   ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer_,
                   {.header_lifetime = std::chrono::seconds(-1)});
   QueuedExport queued = *exports_.Get("exports/1");
-  EXPECT_THAT(work.Step(&queued), StatusIs(absl::StatusCode::kFailedPrecondition,
-                                           HasSubstr("none is kept any longer")));
+  EXPECT_THAT(work.Step(&queued),
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("none is kept")));
   EXPECT_EQ(queued.state, BridgeExportState::kFailed);
 }
 
 TEST_F(NoHeaderTest, AStudyThatIsGoneIsToldAndNothingIsStored) {
   pacs_->headers.clear();
-  EXPECT_THAT(Work("exports/1"), StatusIs(absl::StatusCode::kFailedPrecondition,
-                                          HasSubstr("the PACS has the series of this case no")));
+  EXPECT_THAT(Work("exports/1"),
+              StatusIs(absl::StatusCode::kFailedPrecondition,
+                       HasSubstr("the PACS no longer has the series of this case")));
   EXPECT_TRUE(Stored().empty());
 }
 

@@ -100,7 +100,7 @@ TEST_F(RetentionTest, WhatNobodyConfirmsFailsAndLeavesNoPictures) {
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFailed);
   EXPECT_THAT(Updates(), ::testing::Contains(::testing::HasSubstr(
-                             "FAILED 0 nobody has confirmed the patient for 14 days")));
+                             "FAILED 0 the patient was not confirmed for 14 days")));
   EXPECT_FALSE(fs::exists(folder));
 }
 

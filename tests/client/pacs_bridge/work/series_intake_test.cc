@@ -87,7 +87,7 @@ TEST_F(SeriesIntakeTest, CapturesInASeriesHideNoneOfItsSlicesAndGiveNoHeader) {
   ASSERT_EQ(StateOf(series), SeriesState::kChosen);
   const QueuedSeries chosen = *rows_.GetByUid(series.series_uid);
   EXPECT_EQ(chosen.modality, "CT");
-  EXPECT_THAT(chosen.reason, AllOf(HasSubstr("8 axial slices"), HasSubstr("left aside: 20 other")));
+  EXPECT_THAT(chosen.reason, AllOf(HasSubstr("8 axial slices"), HasSubstr("ignored: 20 other")));
   EXPECT_EQ(ReadInstanceHeader(queue_->header_path(chosen.key))->class_uid, kCtImageClass);
   EXPECT_EQ(SourcesAmong(*rows_.ListImages(chosen.key)).size(), 8);
 }
@@ -247,7 +247,7 @@ TEST_F(ChosenInTwoPartsTest, ABuiltPlanStaysAndTheReasonSaysWhatItLacks) {
   EXPECT_THAT(*intake_->Settle(), ::testing::ElementsAre(series.key));
   EXPECT_EQ(StateOf(series_), SeriesState::kBuilt);
   EXPECT_THAT(Reason(),
-              AllOf(HasSubstr("5 axial slices"), HasSubstr("images came after its plan")));
+              AllOf(HasSubstr("5 axial slices"), HasSubstr("images arrived after its plan")));
   EXPECT_THAT(*intake_->Settle(), ::testing::IsEmpty()) << "it is told once";
 }
 
@@ -269,7 +269,7 @@ TEST_F(SeriesInTwoPartsTest, AnotherRecipeLeavesNothingOfTheEarlierPlan) {
   ReceiveFirst(8);
   PutPlan();
   const QueuedSeries series = *rows_.GetByUid(series_.series_uid);
-  ASSERT_THAT(intake_->Choose(series, "other.json", "chosen by hand"), IsOk());
+  ASSERT_THAT(intake_->Choose(series, "other.json", "chosen manually"), IsOk());
   EXPECT_FALSE(fs::exists(queue_->plan_path(series.key)));
   EXPECT_EQ(rows_.GetByUid(series_.series_uid)->recipe, "other.json");
 }

@@ -288,7 +288,7 @@ TEST_F(DicomSeriesTest, OtherSizesAndOrientationsAreNeverJoined) {
       ASSERT_OK_AND_ASSIGN(const CtVolume volume, ReadJoining(join));
       EXPECT_EQ(volume.size[2], 22);
       EXPECT_EQ(WorstPhantomError(volume), 0);
-      EXPECT_THAT(volume.provenance.notes, ::testing::Contains(HasSubstr("left aside: series 2")));
+      EXPECT_THAT(volume.provenance.notes, ::testing::Contains(HasSubstr("ignored: series 2")));
     }
   }
 }
@@ -347,7 +347,7 @@ TEST_F(DicomSeriesTest, SeriesTooShortForAVolumeDoNotStandInTheWay) {
     bolus[i].Text(DicomFile::kInstanceNumber, "IS", absl::StrCat(i));
   }
   WriteSeries(Joined(LongPhantom(), bolus));
-  ExpectPhantom(24, "left aside: series 8 (5 slices)");
+  ExpectPhantom(24, "ignored: series 8 (5 slices)");
 }
 
 // 28 slices of a GE scanner (SOURCE.md of the data): 13 of 4.22 mm, then 13 of 7.38 mm, leaning.

@@ -144,7 +144,7 @@ TEST_F(DicomVolumeTest, OneFileStandsForItsSeries) {
   WriteSeries(other, "other");
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read({}, "other004"));
   EXPECT_NEAR(volume.spacing_mm[2], 2, 1e-9);
-  EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("left aside: series 2 (9 slices)")));
+  EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("ignored: series 2 (9 slices)")));
 }
 
 TEST_F(DicomVolumeTest, SeveralSeriesAreListedAndChosenByNumber) {
@@ -179,7 +179,7 @@ TEST_F(DicomVolumeTest, OtherSeriesAndOtherFilesAreLeftAsideWithANote) {
   EXPECT_EQ(volume.size[2], 9);
   EXPECT_THAT(volume.provenance.notes,
               ElementsAre(HasSubstr("series 1 (1 files; the first is a localiser"),
-                          HasSubstr("1 files that are no DICOM")));
+                          HasSubstr("1 files that are not DICOM")));
 }
 
 TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithWhatItHolds) {
@@ -188,7 +188,7 @@ TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithWhatItHolds) {
   Expect(Read(), "no files but 1 folders");
   Write("readme.txt", "not a slice");
   Expect(Read(), "none of the 1 files in the folder is a DICOM file");
-  Expect(Read({}, "readme.txt"), "the file is no DICOM file");
+  Expect(Read({}, "readme.txt"), "the file is not a DICOM file");
 }
 
 TEST_F(DicomVolumeTest, FolderWithADirectoryAndNoImageIsRefused) {
@@ -212,10 +212,10 @@ std::vector<BadValue> OtherKinds() {
       {DicomFile::kModality, "CS", "MR", "of modality MR"},
       {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.7", "a photograph or copy of a screen"},
       {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.77.1.4", "a photograph"},
-      {DicomFile::kImageType, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER", "a localiser"},
-      {DicomFile::kPhotometric, "CS", "RGB", "a colour image"},
-      {DicomFile::kSamplesPerPixel, "US", std::string("\3\0", 2), "a colour image"},
-      {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.88.67", "no plain CT image"},
+      {DicomFile::kImageType, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER", "a localizer"},
+      {DicomFile::kPhotometric, "CS", "RGB", "a color image"},
+      {DicomFile::kSamplesPerPixel, "US", std::string("\3\0", 2), "a color image"},
+      {DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.88.67", "not a conventional CT image"},
   };
 }
 
@@ -231,7 +231,8 @@ TEST_F(DicomVolumeTest, FolderOfAnotherKindIsRefused) {
   }
   // They may be slices that are not read.
   ExpectFifthSliceIsRefused(kinds.back());
-  ExpectFifthSliceIsRefused({DicomFile::kRows, "US", std::string("\0\0", 2), "cut off or damaged"});
+  ExpectFifthSliceIsRefused(
+      {DicomFile::kRows, "US", std::string("\0\0", 2), "truncated or damaged"});
 }
 
 TEST_F(DicomVolumeTest, OtherObjectsOfTheSeriesAreLeftAsideWithANote) {
@@ -249,7 +250,7 @@ TEST_F(DicomVolumeTest, OtherObjectsOfTheSeriesAreLeftAsideWithANote) {
     EXPECT_EQ(volume.size[2], 9);
     EXPECT_EQ(WorstPhantomError(volume), 0);
     EXPECT_THAT(volume.provenance.notes,
-                ElementsAre(AllOf(HasSubstr("left aside in series 2, not CT slices: file 1 of"),
+                ElementsAre(AllOf(HasSubstr("ignored in series 2, not CT slices: file 1 of"),
                                   HasSubstr(kind.message))));
     Expect(Read({}, "slice000"), "file 1 of the folder (instance number 10) is not a CT slice but");
   }
@@ -262,7 +263,7 @@ TEST_F(DicomVolumeTest, OtherObjectInThePlaceOfASliceIsNotedAsAGap) {
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
   EXPECT_EQ(WorstPhantomError(volume), 0);
   EXPECT_THAT(volume.provenance.notes,
-              ElementsAre(HasSubstr("file 5 of the folder (a colour image)"),
+              ElementsAre(HasSubstr("file 5 of the folder (a color image)"),
                           HasSubstr("1 slice is missing between")));
 }
 
@@ -285,11 +286,11 @@ TEST_F(DicomVolumeTest, SliceThatIsMissingBecauseItsFileIsDamagedIsRefused) {
   Write("zzz", std::string(100, '\0'));
   EXPECT_THAT(Read(),
               StatusIs(kInvalid, AllOf(HasSubstr("file 9 of the folder is a DICOM file that "
-                                                 "is cut off"),
+                                                 "is truncated"),
                                        HasSubstr("1 slice is missing"))));
   WriteSeries(PhantomSeries());  // nothing is missing beside it
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
-  EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("cut off or damaged")));
+  EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("truncated or damaged")));
 }
 
 TEST_F(DicomVolumeTest, CopyOfASliceIsLeftAside) {
@@ -307,7 +308,7 @@ TEST_F(DicomVolumeTest, OtherSliceAtTheSamePlaceIsRefused) {
   series.push_back(series[3]);
   series.back().Pixels(std::vector<uint16_t>(120, 1000));
   WriteSeries(series);
-  Expect(Read(), "lie at the same place");
+  Expect(Read(), "have the same position");
 }
 
 // Where the phantom's slices are taken at other heights.
@@ -334,7 +335,7 @@ TEST_F(DicomVolumeTest, UnevenSlicesKeepTheirPlaces) {
     }
     EXPECT_LE(WorstPhantomError(volume), tilt_deg == 0 ? 0 : 1);
     EXPECT_NEAR(volume.provenance.gantry_tilt_deg, tilt_deg, 1e-6);
-    EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("the slices lie unevenly")));
+    EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("the slices are unevenly spaced")));
   }
 }
 
@@ -416,7 +417,7 @@ TEST_F(DicomVolumeTest, OffsetTakesThePlaceOfMissingRescaleTagsOnly) {
   options.hu_offset = -1024;
   std::vector<DicomFile> series = PhantomSeries();
   WriteSeries(series);
-  Expect(Read(options), "take \"hu_offset\" out of the recipe");
+  Expect(Read(options), "remove \"hu_offset\" from the recipe");
   for (DicomFile& file : series)
     file.Erase(DicomFile::kRescaleIntercept).Erase(DicomFile::kRescaleSlope);
   WriteSeries(series);
@@ -457,7 +458,7 @@ TEST_F(DicomVolumeTest, OffsetUndoesARescaleThatWasAppliedTwice) {
   std::vector<DicomFile> series = PhantomSeries();
   for (DicomFile& file : series) file.Text(DicomFile::kRescaleIntercept, "DS", "-4000");
   WriteSeries(series);
-  Expect(Read(), "nothing but air");
+  Expect(Read(), "only air");
   Expect(Read(), "state \"hu_offset\"");
   CtReadOptions options;
   options.hu_offset = 2976;

@@ -65,7 +65,7 @@ TEST(HuCheckTest, OtherValuesAreNotGuessedAt) {
                 StatusIs(kInvalid, HasSubstr("state \"hu_offset\"")));
   }
   EXPECT_THAT(CheckHu(Head(1024), 24), StatusIs(kInvalid, HasSubstr("hu_offset 24; correct it")));
-  EXPECT_THAT(CheckHu(Head(-2048), -2048), StatusIs(kInvalid, HasSubstr("nothing but air")));
+  EXPECT_THAT(CheckHu(Head(-2048), -2048), StatusIs(kInvalid, HasSubstr("only air")));
   EXPECT_EQ(CheckHu({}, std::nullopt).code(), kInvalid);
 }
 

@@ -58,10 +58,10 @@ TEST_F(MultiFrameTest, FramesWithoutAPlaceAreNamed) {
   DicomFile spoilt = whole;
   Write("ct", spoilt.Erase(DicomFile::kFrameGroups).Bytes());
   EXPECT_THAT(Read(), StatusIs(kInvalid, AllOf(HasSubstr("holds no CT slices"),
-                                               HasSubstr("does not say where its frames lie"))));
+                                               HasSubstr("without frame positions"))));
   spoilt = whole;
   Write("ct", spoilt.Text(DicomFile::kNumberOfFrames, "IS", "10").Bytes());
-  EXPECT_THAT(Read(), StatusIs(kInvalid, HasSubstr("does not say where its frames lie")));
+  EXPECT_THAT(Read(), StatusIs(kInvalid, HasSubstr("without frame positions")));
   spoilt = whole;
   Write("ct", spoilt.Erase(DicomFile::kSharedGroups).Bytes());
   EXPECT_THAT(Read(), StatusIs(kInvalid, AllOf(HasSubstr("file 1 of the folder, frame 1"),

@@ -403,7 +403,7 @@ TEST_F(VolumeFileTest, BundledHeadIsReadWithItsRecipe) {
   options.hu_offset = 1000;
   EXPECT_THAT(ReadCtVolume(path, options), StatusIs(kInvalid, HasSubstr("hu_offset 1000")));
   options.hu_offset = -6000;
-  EXPECT_THAT(ReadCtVolume(path, options), StatusIs(kInvalid, HasSubstr("nothing but air")));
+  EXPECT_THAT(ReadCtVolume(path, options), StatusIs(kInvalid, HasSubstr("only air")));
 }
 
 TEST_F(VolumeFileTest, PathThatIsNotThereIsNotFound) {

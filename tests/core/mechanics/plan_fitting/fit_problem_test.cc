@@ -134,12 +134,12 @@ TEST_F(FitProblemTest, BadTargetsAreNamed) {
   refused([&] { target().movement_mm = kNan; }, "a number is NaN");
   refused([&] { target().point_mm = Vector3d(kNan, 0, 0); }, "a number is NaN");
   refused([&] { target().direction = Vector3d(0, 0, 0); }, "its direction has no length");
-  refused([&] { target().point_mm.reset(); }, "it must say one point");
-  refused([&] { target().vertices = {1}; }, "it must say one point");
-  refused([&] { target().position_mm = Vector3d(0, 0, 0); }, "what is wanted in one way");
-  refused([&] { target().direction.reset(); }, "what is wanted in one way");
-  refused([&] { request_.targets.push_back(target()); }, "there are two of that name");
-  refused([&] { request_.targets.clear(); }, "there is no target");
+  refused([&] { target().point_mm.reset(); }, "it must have one location");
+  refused([&] { target().vertices = {1}; }, "it must have one location");
+  refused([&] { target().position_mm = Vector3d(0, 0, 0); }, "it must have one goal");
+  refused([&] { target().direction.reset(); }, "it must have one goal");
+  refused([&] { request_.targets.push_back(target()); }, "the name is not unique");
+  refused([&] { request_.targets.clear(); }, "there are no targets");
   refused([&] { request_.targets.resize(257, target()); }, "at most 256");
   refused([&] { request_.tolerance_mm = kNan; }, "tolerance_mm is nan");
   refused([&] { request_.less_movement = -1; }, "less_movement is -1");
@@ -161,13 +161,13 @@ TEST_F(FitProblemTest, BadFreedomsAreNamed) {
   refused([&] { freedom().handle = "nose"; },
           "free handle \"nose\": the plan has no such handle; it has handle 0, handle 1");
   refused([&] { request_.moving.push_back(freedom()); }, "it is listed twice");
-  refused([&] { request_.moving.clear(); }, "nothing may move");
+  refused([&] { request_.moving.clear(); }, "no free numbers");
   refused(
       [&] {
         freedom().translation[1] = {2, -2};
       },
       "the bounds of its translation along y cross");
-  refused([&] { freedom().translation[1] = {-2, 1001}; }, "translation along y go beyond 1000 mm");
+  refused([&] { freedom().translation[1] = {-2, 1001}; }, "translation along y exceed 1000 mm");
   refused([&] { freedom().rotation[0] = {kNan, 1}; }, "rotation about x is NaN or infinite");
   refused([&] { freedom().pivot_mm = Vector3d(0, kNan, 0); }, "its pivot_mm is NaN or infinite");
 }
@@ -184,7 +184,7 @@ TEST_F(FitProblemTest, MoreFreedomsThanTheLimitAreRefused) {
   const std::vector<HandlePose> poses(5);
   const TetMesh mesh = testing::Bar({4, 20, 8}, 2.0);
   EXPECT_THAT(ResolveFit(request_, mesh, constraints, poses),
-              StatusIs(kInvalid, HasSubstr("30 numbers may move; at most 24")));
+              StatusIs(kInvalid, HasSubstr("30 free numbers; at most 24")));
   request_.moving.pop_back();
   EXPECT_THAT(ResolveFit(request_, mesh, constraints, poses), IsOk());
 }

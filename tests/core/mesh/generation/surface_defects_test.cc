@@ -77,7 +77,7 @@ TEST(SurfaceDefectsTest, TurnedTriangleIsMarkedWithItsNeighbours) {
 TEST(SurfaceDefectsTest, BoxesThatGoThroughEachOtherAreNamedWithTheirTriangles) {
   const TriangleMesh boxes = Together(Box(), BoxSurface({3.3, 3.2, 3.1}, {9, 9, 9}, 3));
   const SurfaceDefects defects = FindSurfaceDefects(boxes);
-  ExpectRefused(defects, "triangles go through each other");
+  ExpectRefused(defects, "triangles intersect");
   EXPECT_GT(defects.num_intersecting_pairs, 0);
   EXPECT_EQ(CountOf(defects, "intersecting_triangles"),
             Marked(defects, TriangleFlaw::kIntersecting));

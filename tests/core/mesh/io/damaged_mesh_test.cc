@@ -140,10 +140,10 @@ TEST_F(DamagedMeshTest, OtherFormatsBehindTheEndingAreNamed) {
 }
 
 TEST_F(DamagedMeshTest, XmlThatIsNoUnstructuredGridIsRefused) {
-  EXPECT_THAT(Read("<html><body>404</body></html>"), IsRefused("no .vtu file"));
+  EXPECT_THAT(Read("<html><body>404</body></html>"), IsRefused("not a .vtu file"));
   EXPECT_THAT(ReadWith("UnstructuredGrid", "PolyData"), IsRefused("VTK XML polygons (.vtp)"));
-  EXPECT_THAT(ReadWith("UnstructuredGrid", "ImageData"), IsRefused("no .vtu file"));
-  EXPECT_THAT(Read("<"), IsRefused("no .vtu file"));
+  EXPECT_THAT(ReadWith("UnstructuredGrid", "ImageData"), IsRefused("not a .vtu file"));
+  EXPECT_THAT(Read("<"), IsRefused("not a .vtu file"));
 }
 
 TEST_F(DamagedMeshTest, RandomBytesAreRefused) {

@@ -207,8 +207,8 @@ TEST_F(SurfaceFormatsTest, BinaryStlIsReadAndItsLengthChecked) {
   EXPECT_EQ(file.mesh.num_triangles(), 1);
   stl[0] = 'b';
   stl[80] = 2;
-  EXPECT_THAT(ReadSurface("a.stl", stl),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("truncated or no STL file")));
+  EXPECT_THAT(ReadSurface("a.stl", stl), StatusIs(absl::StatusCode::kInvalidArgument,
+                                                  HasSubstr("truncated or not an STL file")));
 }
 
 // One triangle as each format writes it, with a line of comment or a header.

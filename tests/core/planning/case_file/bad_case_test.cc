@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadJson{"ViewsAreNone", [](Json* j) { (*j)["bufferViews"] = 3; }, "/bufferViews"},
         BadJson{"MorePositionsThanBytes", [](Json* j) { (*j)["accessors"][0]["count"] = 2147483647; }, "bytes where"},
         BadJson{"MoreIndicesThanBytes", [](Json* j) { (*j)["accessors"][1]["count"] = 3000; }, "bytes where"},
-        BadJson{"HalfATriangle", [](Json* j) { (*j)["accessors"][1]["count"] = 4; }, "no triangles"},
+        BadJson{"HalfATriangle", [](Json* j) { (*j)["accessors"][1]["count"] = 4; }, "do not form triangles"},
         BadJson{"OtherNumbers", [](Json* j) { (*j)["accessors"][1]["componentType"] = 5123; }, "/accessors/1/componentType"},
         BadJson{"SparsePositions", [](Json* j) { (*j)["accessors"][0]["sparse"] = Json::object(); }, "/accessors/0"},
         BadJson{"AccessorThatIsNot", [](Json* j) { (*j)["meshes"][0]["primitives"][0]["indices"] = 99; }, "/indices"},

@@ -82,10 +82,10 @@ TEST_F(PredictedCaseTest, WhatIsNoNumberIsRefused) {
   Positions deformed = rest_;
   deformed(0, 0) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(PredictCase(case_, deformed, {{"top", {}}}).status().message(),
-              HasSubstr("no number"));
+              HasSubstr("not a number"));
   EXPECT_THAT(
       PredictCase(case_, rest_, {{"top", {.translation_mm = {1e300, 0, 0}}}}).status().message(),
-      HasSubstr("beyond all bounds"));
+      HasSubstr("too far to be valid"));
 }
 
 }  // namespace

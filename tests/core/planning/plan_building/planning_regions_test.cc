@@ -116,8 +116,8 @@ TEST(PlanningRegionsTest, BonesNearOneAnotherLeaveBothSidesFree) {
 
 TEST(PlanningRegionsTest, ATetIsNotHeldByTwo) {
   const Column column(2);  // every tet reaches from bone to bone
-  EXPECT_THAT(column.Assign(0), StatusIs(absl::StatusCode::kInvalidArgument,
-                                         HasSubstr("no vertex of the mesh left")));
+  EXPECT_THAT(column.Assign(0),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no vertices left")));
 }
 
 TEST(PlanningRegionsTest, LargestMoveIsThatOfTheFarthestVoxel) {

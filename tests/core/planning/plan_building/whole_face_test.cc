@@ -223,7 +223,7 @@ TEST_F(WholeFaceTest, TheBundledHeadIsReadyAndItsNoseWhole) {
     EXPECT_EQ(cut.low.x(), cut.high.x());
   }
   for (const std::string& caution : CutCautions(coverage)) {
-    EXPECT_THAT(caution, ::testing::Not(::testing::HasSubstr("looked at")));
+    EXPECT_THAT(caution, ::testing::Not(::testing::HasSubstr("front of the face")));
   }
   EXPECT_FALSE(NoseIsCut(coverage));
   EXPECT_NEAR(NoseTipErrorMm(*shared_face), 0, 0.5);
@@ -314,7 +314,7 @@ TEST_F(WholeFaceTest, ANoseThatTheScannersCircleCutsHasNoSkinThereAndThatIsTold)
   EXPECT_GE(coverage.cuts[0].high.z(), tip.z());
   EXPECT_TRUE(NoseIsCut(coverage));
   ASSERT_FALSE(CutCautions(coverage).empty());
-  EXPECT_THAT(CutCautions(coverage)[0], ::testing::HasSubstr("The scanner's circle"));
+  EXPECT_THAT(CutCautions(coverage)[0], ::testing::HasSubstr("The field of view"));
   EXPECT_THAT(CutCautions(coverage)[0], ::testing::HasSubstr("the nose ("));
   EXPECT_TRUE(IsReady(coverage)) << FailedText(CheckCoverage(coverage));
 

@@ -79,8 +79,8 @@ TEST(CoverageReportTest, ACutOfTheScannersCircleIsToldAndNoReasonToRefuse) {
   EXPECT_THAT(CutCautions(coverage),
               ElementsAre(AllOf(HasSubstr("at (1, 2, 3) mm: 545 mm2"),
                                 HasSubstr("between (0, 1, 2) mm and (2, 3, 4) mm"),
-                                HasSubstr("looked at for: of the nose (345 mm2)")),
-                          AllOf(HasSubstr("212 mm2"), Not(HasSubstr("looked at")))));
+                                HasSubstr("evaluated: at the nose (345 mm2)")),
+                          AllOf(HasSubstr("212 mm2"), Not(HasSubstr("front of the face")))));
   EXPECT_TRUE(NoseIsCut(coverage));
   coverage.cuts.erase(coverage.cuts.begin());
   EXPECT_FALSE(NoseIsCut(coverage));

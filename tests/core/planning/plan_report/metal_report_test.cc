@@ -52,7 +52,7 @@ TEST(MetalReportTest, MuchMetalAsksForPlanes) {
   PlanBuild build = WithMetal();
   build.metal.volume_mm3 = 4000;
   EXPECT_THAT(MetalCautions(build),
-              ElementsAre(HasSubstr("4.0 cm3"), HasSubstr("Give \"occlusal_plane\"")));
+              ElementsAre(HasSubstr("4.0 cm3"), HasSubstr("Set \"occlusal_plane\"")));
 }
 
 TEST(MetalReportTest, TheReportHasEveryPiece) {

@@ -52,10 +52,10 @@ TEST(ReportHtmlTest, NoTextOfTheReportIsMarkup) {
 TEST(ReportHtmlTest, CautionsHaveASectionIfThereAreAny) {
   nlohmann::ordered_json report = SmallReport(true);
   report["cautions"] = {"no nose", "no chin"};
-  EXPECT_THAT(PlanReportHtml(report, {}),
-              AllOf(HasSubstr("Mind about this CT"), HasSubstr("<li>no nose</li>\n<li>no chin")));
+  EXPECT_THAT(PlanReportHtml(report, {}), AllOf(HasSubstr("Limitations of this CT"),
+                                                HasSubstr("<li>no nose</li>\n<li>no chin")));
   report["cautions"] = nlohmann::ordered_json::array();
-  EXPECT_THAT(PlanReportHtml(report, {}), Not(HasSubstr("Mind about this CT")));
+  EXPECT_THAT(PlanReportHtml(report, {}), Not(HasSubstr("Limitations of this CT")));
 }
 
 TEST(ReportHtmlTest, PageSaysWhatIsMetAndThatItIsNoMedicalDevice) {

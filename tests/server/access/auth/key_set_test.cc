@@ -77,18 +77,19 @@ INSTANTIATE_TEST_SUITE_P(
                   set["keys"][0]["e"] = "AQ";
                   return set.dump();
                 }},
-        BadKeys{"NoPointOfTheCurve", "no point",
+        BadKeys{"NoPointOfTheCurve", "not a point",
                 [] { return WithKey("y", std::string(43, 'A')).dump(); }},
         BadKeys{"CoordinateTooShort", "32 bytes", [] { return WithKey("x", "AAAA").dump(); }},
         BadKeys{"CoordinateMissing", "\"x\" is missing", [] { return WithKey("x", 7).dump(); }},
-        BadKeys{"TwoOfOneName", "one name", [] { return JwksOf(EcKey(), EcKey()); }},
+        BadKeys{"TwoOfOneName", "same `kid`", [] { return JwksOf(EcKey(), EcKey()); }},
         BadKeys{"OnlyForEncryption", "no key", [] { return WithKey("use", "enc").dump(); }},
         BadKeys{"OnlyForPs256", "no key", [] { return WithKey("alg", "PS256").dump(); }},
         BadKeys{"NoKeys", "no key", [] { return std::string(R"({"keys": []})"); }},
         BadKeys{"NoSet", "Key Set", [] { return std::string(R"({"key": 1})"); }},
         BadKeys{"HalfASet", "Key Set", [] { return EcKey().PublicJwks().dump().substr(0, 80); }},
-        BadKeys{"KeyIsNoObject", "no JSON object", [] { return std::string(R"({"keys": [1]})"); }},
-        BadKeys{"PemAndSomethingElse", "something else",
+        BadKeys{"KeyIsNoObject", "not a JSON object",
+                [] { return std::string(R"({"keys": [1]})"); }},
+        BadKeys{"PemAndSomethingElse", "something other",
                 [] {
                   return EcKey().PublicPem() +
                          "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n";
@@ -103,7 +104,7 @@ TEST(KeySetTest, AKeyFileThatIsNotThereIsOneLine) {
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("--token-keys: it cannot be")));
   options.keys_file = "/dev/zero";
   EXPECT_THAT(TokenAuthenticator::Start(options).status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no regular file")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a regular file")));
 }
 
 TEST(KeySetTest, OtherKeysOfAProviderArePassedOver) {

@@ -73,14 +73,14 @@ TEST_P(BadListTest, IsRefusedAndSaysNothing) {
 
 INSTANTIATE_TEST_SUITE_P(
     Lists, BadListTest,
-    ::testing::Values(BadList{"Empty", "", "no JSON object"},
-                      BadList{"HalfWritten", R"({"token_ids": ["a")", "no JSON object"},
-                      BadList{"Misspelt", R"({"token_id": []})", "none of"},
-                      BadList{"NoList", R"({"token_ids": "a"})", "no list"},
-                      BadList{"EmptyId", R"({"token_ids": [""]})", "no list"},
+    ::testing::Values(BadList{"Empty", "", "not a JSON object"},
+                      BadList{"HalfWritten", R"({"token_ids": ["a")", "not a JSON object"},
+                      BadList{"Misspelt", R"({"token_id": []})", "unknown member"},
+                      BadList{"NoList", R"({"token_ids": "a"})", "not a list"},
+                      BadList{"EmptyId", R"({"token_ids": [""]})", "not a list"},
                       BadList{"ShortDigest", R"({"token_digests": ["abc"]})", "64"},
                       BadList{"NoTime", R"({"principals": {"a": "yesterday"}})", "time"},
-                      BadList{"PrincipalsAsList", R"({"principals": ["a"]})", "none of"}),
+                      BadList{"PrincipalsAsList", R"({"principals": ["a"]})", "unknown member"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 // n - s in place of s signs the same, and whoever has the token can write it so.

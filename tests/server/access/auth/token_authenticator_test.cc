@@ -204,7 +204,7 @@ std::string SentenceOf(const std::string& name, const Json& value) {
 
 TEST(RefusedTokenTest, ATokenWithAGoodSignatureIsToldWhatIsExpectedOfIt) {
   EXPECT_THAT(SentenceOf("iss", "https://sts.example/1/"),
-              HasSubstr("issuer is \"https://sts.example/1/\", and this server takes tokens of "
+              HasSubstr("issuer is \"https://sts.example/1/\"; this server accepts only tokens of "
                         "\"https://login.example\" only"));
   EXPECT_THAT(SentenceOf("iss", nullptr), HasSubstr("issuer is \"null\""));
   EXPECT_THAT(SentenceOf("aud", "another"),
@@ -223,7 +223,7 @@ TEST(RefusedTokenTest, ATokenIsToldByHowMuchTheClocksDiffer) {
   Json claims = With(With(GoodClaims(), "iat", second), "exp", second + 600);
   const std::string token = WithClaims(claims);
   EXPECT_THAT(std::string(Ask(at(std::chrono::seconds(-301)).get(), token).status().message()),
-              HasSubstr("begins in 5m"));
+              HasSubstr("becomes valid in 5m"));
   EXPECT_THAT(std::string(Ask(at(std::chrono::seconds(901)).get(), token).status().message()),
               HasSubstr("expired 5m"));
 }

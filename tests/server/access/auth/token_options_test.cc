@@ -54,7 +54,7 @@ TEST(TokenOptionsTest, WhatIsMissingIsNamed) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--token-jwks-url")));
   options.jwks_url = "http://login.example/keys";
   EXPECT_THAT(CheckTokenOptions(options),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("must be https")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("must use https")));
   options.jwks_url = "https://login.example/keys";
   EXPECT_THAT(CheckTokenOptions(options), IsOk());
   options.keys_file = "keys.pem";

@@ -151,13 +151,13 @@ TEST_F(BackupTest, WhatIsDeletedBetweenRowsAndFilesIsInNeither) {
 TEST_F(BackupTest, ARowWhoseFileIsLostIsToldAndNothingIsLeft) {
   const std::string sha256 = KeepCaseOf(5000);
   fs::remove(data_ + "/blobs/" + sha256);
-  EXPECT_THAT(BackUp(data_, backup_), StatusIs(absl::StatusCode::kAborted, HasSubstr("not there")));
+  EXPECT_THAT(BackUp(data_, backup_), StatusIs(absl::StatusCode::kAborted, HasSubstr("missing")));
   EXPECT_FALSE(fs::exists(backup_));
 }
 
 TEST_F(BackupTest, AFolderOfSomethingElseIsNoBackup) {
   EXPECT_THAT(VerifyBackup(::testing::TempDir()),
-              StatusIs(absl::StatusCode::kNotFound, HasSubstr("it is none")));
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("not a backup")));
 }
 
 TEST_F(BackupTest, ADamagedFileIsToldAndNothingIsLeft) {

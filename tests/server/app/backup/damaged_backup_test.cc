@@ -127,7 +127,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_F(DamagedBackup, AFolderThatHoldsSomethingIsNotRestoredInto) {
   EXPECT_THAT(RestoreBackup(backup_, scratch_ / "data"),
-              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("empty one")));
+              StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("empty folder")));
   fs::create_directory(target_);
   std::ofstream(target_ + "/mine") << "mine";
   EXPECT_THAT(RestoreBackup(backup_, target_), StatusIs(absl::StatusCode::kAlreadyExists));

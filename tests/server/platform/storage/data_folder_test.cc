@@ -58,7 +58,7 @@ TEST(DataFolderTest, WhatIsNoFolderIsRefused) {
   const ScratchFolder scratch;
   std::ofstream(scratch / "file") << "text";
   EXPECT_THAT(DataFolder::Open(scratch / "file").status(),
-              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("move it away")));
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("move it")));
   EXPECT_FALSE(DataFolder::Open(scratch / "file/below").ok());
   EXPECT_FALSE(DataFolder::Open("/proc/nothing/can/be/made/here").ok());
 }
@@ -70,7 +70,7 @@ TEST(DataFolderTest, IsHeldByOneAtATimeAndTheOtherIsToldByWhom) {
     const auto second = DataFolder::Open(scratch / "data");
     EXPECT_THAT(second.status(), StatusIs(absl::StatusCode::kUnavailable,
                                           AllOf(HasSubstr(absl::StrCat("process ", getpid())),
-                                                HasSubstr("another folder by --data-dir"))));
+                                                HasSubstr("another folder with --data-dir"))));
     const DataFolder moved = std::move(first);
     EXPECT_FALSE(DataFolder::Open(scratch / "data").ok()) << "the lock moves with it";
   }

@@ -50,7 +50,7 @@ TEST(OrderedJobsTest, AJobThatWaitsHoldsUpItsOwnKeyAlone) {
       if (!told.exchange(true)) other_ran.set_value();
     });
   }
-  other_ran.get_future().wait();
+  EXPECT_EQ(other_ran.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
   released.set_value();
 }
 
