@@ -87,7 +87,7 @@ describe("the hand-made face", () => {
     await page.getByText(/Open by 20\.0°, 1\d\.\d mm between the incisors/).waitFor();
     expect((await state(page)).moves).toEqual(before);
     await page.getByRole("button", { name: "Show occlusal contacts" }).click();
-    await page.getByText("The teeth lie more than 6 mm from each other.").waitFor();
+    await page.getByText("The teeth are more than 6 mm apart.").waitFor();
     await page.locator(".legend").getByText("Distance between upper and lower teeth, mm").waitFor();
     expect(await page.locator(".legend .ticks span").allInnerTexts()).toEqual(["6.0", "3.0", "0.0"]);
     const canTake = () => page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.gizmo.controls.enabled as boolean);
@@ -170,7 +170,7 @@ describe("the bundled head", () => {
     await forward.fill("60");
     await forward.press("Enter");
     await page.getByText(/Chin: cannot be reached; \d+\.\d mm are missing\./).waitFor();
-    await page.getByText(/Held by its limit: /).waitFor();
+    await page.getByText(/At its limit: /).waitFor();
     expect(await seriousFindings(page)).toEqual([]);
     await page.getByRole("button", { name: "Reject" }).click();
     await moved(page, 0, 0.05);
@@ -197,7 +197,7 @@ describe("the bundled head", () => {
     await page.getByRole("button", { name: "Remove the target for Chin" }).click();
     // This case has the scanner's axes alone.
     await open(page, "Measures");
-    await page.getByText("In the axes of the scanner").waitFor();
+    await page.getByText("In the scanner axes").waitFor();
     await open(page, "Profile");
     await expect.poll(() => page.locator(".profile path").last().getAttribute("d")).toMatch(/^M[\d.]+ [\d.]+L/);
     expect(faults).toEqual([]);

@@ -204,7 +204,7 @@ describe("a whole head", () => {
     await expect.poll(async () => Number((await row("Soft pogonion").allInnerTexts())[0])).toBeGreaterThan(5);
     await typeMove(page, "Forward", "0");
     await typeMove(page, "Up", "-3");
-    await page.getByText(/Lower jaw lies up to [1-5]\.\d mm in Chin\./).waitFor();
+    await page.getByText(/Lower jaw overlaps Chin by up to [1-5]\.\d mm\./).waitFor();
     // Its points are those of the closed jaw.
     const seesPoints = () => page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.points.get("penetration").visible as boolean);
     expect(await seesPoints()).toBe(true);
@@ -261,14 +261,14 @@ describe("bad input", () => {
         zone.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
       }, bytes.toString("base64"));
     await drop(Buffer.from([1, 2, 3]));
-    await page.getByRole("alert").getByText("This is no case file").waitFor();
+    await page.getByRole("alert").getByText("This is not a case file").waitFor();
     await drop(readFileSync(planner.casePath));
     await live(page);
     expect(faults).toEqual([]);
   });
 
   test.each<[string, (bytes: Buffer) => Buffer, string]>([
-    ["a file that is no case", () => Buffer.from("hello"), "This is no case file"],
+    ["a file that is no case", () => Buffer.from("hello"), "This is not a case file"],
     ["a case that is cut off", (bytes) => bytes.subarray(0, bytes.length / 2), "copy it again"],
     ["a case that lies about its sizes", (bytes) => Buffer.from(bytes.toString("latin1").replace(/"vertex_count": ?\d+/, (text) => text.replace(/\d/g, "9")), "latin1"), "its counts say"],
   ])("%s is refused in words", async (_, change, text) => {

@@ -251,7 +251,7 @@ TEST_F(DoctorTest, ATokenOfAnotherProviderNamesTheServersOwn) {
   const std::filesystem::path path = WriteToken(GoodClaims());
   WriteTestFile(path, OtherEcKey().MakeToken(With(GoodClaims(), "iss", "https://other.example")));
   const DoctorReport report = AskDoctor({.address = name(), .options = {.token_file = path}});
-  ExpectEndsWith(report, "login", "not one of \"https://login.example\"", "--token-issuer");
+  ExpectEndsWith(report, "login", "does not belong to \"https://login.example\"", "--token-issuer");
   // By the token's own words, read here.
   EXPECT_THAT(report.Text(), HasSubstr("from https://other.example for"));
 }

@@ -53,7 +53,7 @@ TEST_F(DragCommandTest, AnswersEveryPoseHereToo) {
   EXPECT_THAT(drag.out,
               AllOf(ContainsRegex("also answered locally: [1-9][0-9]* columns, [0-9.]+ MB"),
                     HasSubstr("5 poses, "), HasSubstr("answered locally: 5 poses, 0 beyond"),
-                    ContainsRegex("prepared; [0-9.]+ ms \\(p50\\)")));
+                    ContainsRegex("prepared range; [0-9.]+ ms \\(p50\\)")));
 }
 
 TEST_F(DragCommandTest, AnswersNothingHereUnlessAsked) {

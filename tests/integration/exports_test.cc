@@ -152,7 +152,7 @@ TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
     EXPECT_THAT(status.message(), ::testing::Not(HasSubstr("Meier")));
   };
   v1::Measure bad = SomeMeasure("Hans Meier");
-  refused(bad, "measure 1 has a name");
+  refused(bad, "measure 1 has an invalid name");
   refused(SomeMeasure(), "an earlier name");
   bad = SomeMeasure("other");
   bad.set_title("Meier\n");
@@ -165,7 +165,7 @@ TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
   refused(bad, "not finite");
   bad = SomeMeasure("other");
   bad.set_lowest_after(9);
-  refused(bad, "range");
+  refused(bad, "interval");
   std::vector<v1::Measure> many;
   many.reserve(65);
   for (int i = 0; i < 65; ++i) many.push_back(SomeMeasure("own_" + std::to_string(i)));

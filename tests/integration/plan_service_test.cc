@@ -188,9 +188,9 @@ TEST_F(PlanServiceTest, BadRequestsAreRefusedInALineThatNamesTheCulprit) {
   EXPECT_THAT(with([](auto* r) { r->clear_freedoms(); }),
               StatusIs(kInvalidArgument, HasSubstr("no free numbers")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(1)->clear_position_mm(); }),
-              StatusIs(kInvalidArgument, HasSubstr("\"point 1\" wants nothing")));
+              StatusIs(kInvalidArgument, HasSubstr("\"point 1\" has no goal")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(1)->clear_point_mm(); }),
-              StatusIs(kInvalidArgument, HasSubstr("\"point 1\" is nowhere")));
+              StatusIs(kInvalidArgument, HasSubstr("\"point 1\" has no position")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(1)->set_name("point 0"); }),
               StatusIs(kInvalidArgument, HasSubstr("name is not unique")));
   EXPECT_THAT(with([](auto* r) { r->mutable_targets(0)->mutable_point_mm()->set_x(500); }),
@@ -207,7 +207,7 @@ TEST_F(PlanServiceTest, BadRequestsAreRefusedInALineThatNamesTheCulprit) {
   EXPECT_THAT(with([](auto* r) {
                 r->mutable_freedoms(0)->mutable_translation_mm()->mutable_x()->set_lowest(9);
               }),
-              StatusIs(kInvalidArgument, HasSubstr("cross")));
+              StatusIs(kInvalidArgument, HasSubstr("are reversed")));
   EXPECT_THAT(with([](auto* r) { r->set_model(v1::DEFORMATION_MODEL_ARAP); }),
               StatusIs(kInvalidArgument, HasSubstr("no prepared answers")));
   EXPECT_THAT(with([](auto* r) {

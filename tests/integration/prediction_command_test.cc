@@ -124,9 +124,9 @@ TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
   const std::vector<std::string> words = {"compare", field, elastic, "--vertices", "list.txt"};
   EXPECT_THAT(Prediction(words).out, ContainsRegex("\nlisted +3 "));
   Write("list.txt", "7 three");
-  EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("\"three\" is no vertex")));
+  EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("\"three\" is not a vertex")));
   Write("list.txt", " \n");
-  EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("list.txt: names no vertex")));
+  EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("list.txt: no vertices")));
   Write("list.txt", "7 7");
   EXPECT_THAT(Prediction(words), FailsWith(1, HasSubstr("7")));
 
@@ -240,10 +240,10 @@ TEST_F(PredictionCommandTest, ExportRefusesAnotherMeshAndWritesNothing) {
   const std::string name = Create({});
   const std::string other = SourcePath("tests/data/plans/head_chin/plan.json");
   EXPECT_THAT(Prediction({"export", name, "--plan", other, "--out", "after.vtu"}),
-              FailsWith(1, HasSubstr("is not what predictions/")));
+              FailsWith(1, HasSubstr("is not the mesh from which predictions/")));
   WriteBar();
   EXPECT_THAT(Prediction({"export", name, "--mesh", "bar.vtu", "--out", "after.vtu"}),
-              FailsWith(1, HasSubstr("is not what predictions/")));
+              FailsWith(1, HasSubstr("is not the mesh from which predictions/")));
   EXPECT_THAT(Prediction({"export", name, "--out", "after.stl"}),
               FailsWith(1, HasSubstr("--plan")));
   EXPECT_THAT(Prediction({"export", name, "--plan", kTonguePlan, "--out", "after.obj"}),

@@ -260,7 +260,7 @@ TEST_F(ServedCommandTest, WatchTellsOfASessionThatNobodyDrags) {
   ASSERT_OK_AND_ASSIGN(const auto client, TissueformClient::Connect(server->address(), {}));
   ASSERT_OK_AND_ASSIGN(const auto session, PlanSession::Create(client.get(), problem));
   ASSERT_EQ(ExitCodeOf(watch + " " + session->name() + " --seconds 1 > " + PathOf("out")), 0);
-  EXPECT_THAT(Read("out"), ContainsRegex("1 frames/s, age .* nobody drags: at rest\n"));
+  EXPECT_THAT(Read("out"), ContainsRegex("1 frames/s, age .* no drag: at rest\n"));
 }
 
 TEST_F(ServedCommandTest, ServerInfoAsTableAndAsJson) {
@@ -333,7 +333,7 @@ TEST_F(ServedCommandTest, DemoComparesWithTheElasticModelAsInProcess) {
   EXPECT_NEAR(difference["regions"]["free skin"]["max_mm"],
               (ours.mesh.positions() - other.mesh.positions()).rowwise().norm().maxCoeff(), 2e-6);
   // What the server keeps of it, and how far neo_hookean lies from that.
-  EXPECT_THAT(Read("out.txt"), ContainsRegex("kept by the server: predictions/[0-9a-f]+ "));
+  EXPECT_THAT(Read("out.txt"), ContainsRegex("stored by the server: predictions/[0-9a-f]+ "));
   EXPECT_THAT(Summary()["prediction"], StartsWith("predictions/"));
   const Json refinement = Summary()["refinement"];
   EXPECT_NE(refinement["prediction"], Summary()["prediction"]);

@@ -81,7 +81,7 @@ def look_at_taken_ports(folder, programs, port, metrics_port):
         with socket.create_server(("127.0.0.1", taken)):
             code, told = run(folder, programs, port, metrics_port, options)
         check(code != 0 or not options, f"a taken port ends them ({' '.join(options) or 'pasted'})")
-        check(re.search(rf"cannot listen on 127.0.0.1:{taken}: .*--port|port {taken} .*cannot be listened on.*--metrics-port", told), f"they name the port {'PORT' if taken == port else 'METRICS'} and its option")
+        check(re.search(rf"cannot listen on 127.0.0.1:{taken}: .*--port|port {taken} .*is not available.*--metrics-port", told), f"they name the port {'PORT' if taken == port else 'METRICS'} and its option")
 
 
 def look(folder, programs, port, metrics_port, runs):

@@ -72,7 +72,7 @@ def check_their_tokens(channel, keys):
         for forged, told in (
             (sign(claims(exp=int(time.time()) - 100)), "expired"),
             (sign(claims(aud="other")), 'audience is "other", and this server is'),
-            (sign(claims(iss="https://evil.example")), 'issuer is "https://evil.example", and this server takes'),
+            (sign(claims(iss="https://evil.example")), 'issuer is "https://evil.example"; this server accepts only tokens of'),
             (sign(claims(), kid="unknown"), "key does not belong to"),
             (sign(claims(), jku="https://evil.example/keys"), "contains a key"),
             (jwt.encode(claims(), None, "none", headers={"kid": key["kid"]}), "algorithm"),

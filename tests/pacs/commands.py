@@ -166,7 +166,7 @@ def check_merged(programs, bridge, case, study):
     state_of = {found["name"]: found["state"] for found in bridge.status()["exports"]}
     check("it waits for a person again, and nothing is stored", state_of[export] == "asked" and len(programs.instances_of(study)) == before, str(state_of))
     sent = programs.tissueform("prediction", "sent").stdout
-    check("of which the server knows", re.search(rf"{export}.*have changed", sent) is not None, sent)
+    check("of which the server knows", re.search(rf"{export}.*data changed", sent) is not None, sent)
     shown = bridge.run("store", export)
     check("who sees the patient of now, and that it has changed", "MERGED-1" in shown.stdout and "another patient ID" in shown.stdout, shown.stdout)
     stored = bridge.run("store", export, "--confirm-patient")

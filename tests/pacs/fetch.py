@@ -91,13 +91,13 @@ def run(programs):
     reasons = {state: [reason for of, _, reason in found if of == state] for state in states(found)}
     check("the soft one", "soft kernel" in reasons["chosen"][0], str(found))
     check("and the reasons say why not the others",
-          any("softer kernel" in reason for reason in reasons["passed_over"]) and any("localiser" in reason for reason in reasons["passed_over"]), str(found))
+          any("softer kernel" in reason for reason in reasons["passed_over"]) and any("localizer" in reason for reason in reasons["passed_over"]), str(found))
 
     lose_an_image(programs, soft)
     end, found = fetch(programs, study, "part")
     line = end.stderr.strip()
     check("a study of which an image does not come ends with exit code 1 and one line",
-          end.returncode == 1 and re.fullmatch(r"tissueform-pacs: [1-9]\d* objects of the study did not come;.*", line) is not None, line)
+          end.returncode == 1 and re.fullmatch(r"tissueform-pacs: [1-9]\d* objects of the study did not arrive;.*", line) is not None, line)
     check("what came is there, and what lacks an image is not chosen", states(found) == ["chosen", "incomplete", "passed_over"], str(found))
     check("but the sharp one", any(state == "chosen" and "sharp kernel" in reason for state, _, reason in found), str(found))
 

@@ -58,7 +58,7 @@ void AddFollowLinkCommands(CLI::App& session, CommandWork* work) {
   const auto add = [&](const char* name, const char* what,
                        absl::Status (*run)(const LinkOptions&)) -> CLI::App* {
     CLI::App* sub = session.add_subcommand(name, what);
-    sub->add_option("SESSION", options->session, "its name, with \"sessions/\" or without")
+    sub->add_option("SESSION", options->session, "session name, with or without \"sessions/\"")
         ->required();
     AddServerOption(sub, &options->server);
     sub->callback([options, work, run] { *work = [options, run] { return run(*options); }; });

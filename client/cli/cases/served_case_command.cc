@@ -120,7 +120,7 @@ void AddServedCaseCommands(CLI::App& command, CommandWork* work) {
     return sub;
   };
   const auto add_name = [&](CLI::App* sub) {
-    sub->add_option("CASE", options->name, "its name, with \"cases/\" or without")->required();
+    sub->add_option("CASE", options->name, "case name, with or without \"cases/\"")->required();
   };
   CLI::App* publish = add("publish", "publish a case to a server, for planners", Publish);
   publish->add_option("FILE", options->file, "the case, NAME.tfcase (docs/case-format.md)")

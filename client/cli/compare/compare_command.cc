@@ -24,7 +24,7 @@ constexpr char kFooter[] =
     "  tissueform compare plan.json --reference linear_elastic --out compared\n"
     "For a plan, the chosen models (default: all) run in this process on one mesh "
     "and\n"
-    "compared with the reference. Percentiles are nearest-rank; skin means the boundary's "
+    "are compared with the reference. Percentiles are nearest-rank; skin means the boundary's "
     "vertices.";
 
 bool EndsWith(const std::string& path, const char* ending) {

@@ -193,10 +193,11 @@ void AddPartOptions(CLI::App* generate, MeshGenerateOptions* options) {
                    "the part around this point stays empty, as a cavity (repeatable)")
       ->check(NumbersBetweenCommas(3, 3, "X,Y,Z"))
       ->allow_extra_args(false);
-  generate->add_option("--max-seconds", options->filling.limits.max_seconds, "for the tets")
+  generate
+      ->add_option("--max-seconds", options->filling.limits.max_seconds, "time limit for filling")
       ->capture_default_str()
       ->check(CLI::Range(1, 86400));
-  generate->add_option("--max-memory-gib", options->max_memory_gib, "for the tets")
+  generate->add_option("--max-memory-gib", options->max_memory_gib, "memory limit for filling")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1024.0));
 }

@@ -318,11 +318,11 @@ void AddDemoCommand(CLI::App& app, OpenPlanner open_planner, CommandWork* work) 
                     "for scripts: never open a browser (this version opens none)");
   command->add_flag("--serve", options->serve,
                     "keep the server running at the end, until Ctrl-C, with the planner for "
-                    "browsers in front of it, and tell their addresses");
+                    "browsers, and print their addresses");
   command
       ->add_option(kWebPortOption, options->web_port,
-                   absl::StrCat("of --serve: port of the planner; 0 takes a free one (default: ",
-                                kWebPort, ", or a free one where that is taken)"))
+                   absl::StrCat("with --serve: port of the planner; 0 uses a free one (default: ",
+                                kWebPort, ", or a free one if that is in use)"))
       ->check(CLI::Range(0, 65535));
   command->footer(
       "Starts the tissueform-server in this program's folder on loopback, and stops it at the "

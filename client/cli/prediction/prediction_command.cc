@@ -242,7 +242,7 @@ absl::Status Export(const PredictionOptions& options) {
   }
   if (options.out.empty()) return absl::OkStatus();
   TF_RETURN_IF_ERROR(ExportPrediction(options.out, prediction, named, positions));
-  absl::PrintF("%s is written to %s\n", prediction.name(), options.out);
+  absl::PrintF("wrote %s to %s\n", prediction.name(), options.out);
   return absl::OkStatus();
 }
 
@@ -263,7 +263,8 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
                        absl::Status (*run)(const PredictionOptions&)) {
     CLI::App* sub = command->add_subcommand(name, what);
     if (needs_name) {
-      sub->add_option("PREDICTION", options->name, "its name, with \"predictions/\" or without")
+      sub->add_option("PREDICTION", options->name,
+                      "prediction name, with or without \"predictions/\"")
           ->required();
     }
     AddServerOption(sub, &options->server);
@@ -280,9 +281,9 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
   AddAllowOutside(create, &options->reading);
 
   CLI::App* list = add("list", "all predictions", false, List);
-  list->add_option("--session", options->session, "only of this session");
-  list->add_option("--case", options->case_name, "only of this case");
-  add("show", "details of one", true, Show)->add_flag("--json", options->json, "as JSON");
+  list->add_option("--session", options->session, "only predictions of this session");
+  list->add_option("--case", options->case_name, "only predictions of this case");
+  add("show", "show details", true, Show)->add_flag("--json", options->json, "as JSON");
 
   CLI::App* compare = add("compare", "distance to another one, in mm", true, Compare);
   compare->add_option("OTHER", options->other, "the other prediction, of the same mesh");

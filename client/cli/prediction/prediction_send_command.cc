@@ -104,14 +104,14 @@ void AddPredictionSendCommands(CLI::App& prediction, CommandWork* work) {
     return sub;
   };
   CLI::App* send = add("send", "request storage of a prediction in the patient's study", Send);
-  send->add_option("PREDICTION", options->name, "its name, with \"predictions/\" or without")
+  send->add_option("PREDICTION", options->name, "prediction name, with or without \"predictions/\"")
       ->required();
   send->add_flag("--wait", options->wait, "wait until it is stored or fails");
   CLI::App* sent = add("sent", "list exports to the PACS", ListSent);
   sent->add_option("--prediction", options->prediction, "of this prediction only");
   sent->add_option("--case", options->case_name, "of this case only");
   add("unsend", "withdraw an export", Unsend)
-      ->add_option("EXPORT", options->name, "its name, with \"exports/\" or without")
+      ->add_option("EXPORT", options->name, "export name, with or without \"exports/\"")
       ->required();
 }
 

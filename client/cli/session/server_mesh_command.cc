@@ -105,7 +105,7 @@ void AddServerMeshCommand(CLI::App& app, CommandWork* work) {
       "a mesh of tetrahedra (.vtu .vtk .msh .mesh .node .ele), with its scalar cell arrays",
       Upload);
   add(kMeshListCommand, nullptr, List);
-  add(kMeshDeleteCommand, "its name, with \"meshes/\" or without", Delete);
+  add(kMeshDeleteCommand, "mesh name, with or without \"meshes/\"", Delete);
 }
 
 }  // namespace tissueform

@@ -155,7 +155,7 @@ void AddSessionCommand(CLI::App& app, CommandWork* work) {
                        absl::Status (*run)(const SessionOptions&)) -> CLI::App* {
     CLI::App* sub = command->add_subcommand(name, what);
     if (needs_name) {
-      sub->add_option("SESSION", options->name, "its name, with \"sessions/\" or without")
+      sub->add_option("SESSION", options->name, "session name, with or without \"sessions/\"")
           ->required();
     }
     AddServerOption(sub, &options->server);
@@ -163,8 +163,8 @@ void AddSessionCommand(CLI::App& app, CommandWork* work) {
     return sub;
   };
   add("list", "list all sessions, in memory or not", false, List);
-  add("show", "details of one", true, Show);
-  AddUpdateOptions(add("update", "prepare one again with another model, stiffness or other regions",
+  add("show", "show details", true, Show);
+  AddUpdateOptions(add("update", "prepare a session again with another model, stiffness or regions",
                        true, Update),
                    options.get());
   add("delete", "delete one", true, Delete);

@@ -129,7 +129,7 @@ absl::Status Run(const WatchCommandOptions& options) {
 void AddWatchCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<WatchCommandOptions>();
   CLI::App* command = app.add_subcommand(kWatchCommand.name, kWatchCommand.description);
-  command->add_option("SESSION", options->session, "its name, with \"sessions/\" or without")
+  command->add_option("SESSION", options->session, "session name, with or without \"sessions/\"")
       ->required();
   AddServerOption(command, &options->server);
   command->add_option("--seconds", options->seconds, "seconds to watch; 0: until it ends")

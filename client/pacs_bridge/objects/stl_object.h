@@ -20,7 +20,7 @@ struct ModelSurface {
   std::string key = {};  // of ObjectKeys
   CodedTerm kind = {};
   std::string title = {};         // ASCII, for lists of documents
-  bool modified = false;          // is not the mesh from which the CT shows
+  bool modified = false;          // is not what the CT shows
   FloatPositions positions = {};  // #V by 3, mm, LPS
   TriangleIndices triangles = {};
 };

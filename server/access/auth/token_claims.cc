@@ -103,7 +103,7 @@ std::string Quote(const Json* claim) {
 absl::Status RefuseIssuer(const Json* found, const std::string& expected) {
   return RefuseToken(TokenFailure::kIssuer, absl::StrCat("the token's issuer is ", Quote(found),
                                                          "; this server accepts only tokens of ",
-                                                         QuoteForCaller(expected), " only"));
+                                                         QuoteForCaller(expected)));
 }
 
 absl::Status RefuseAudience(const Json* found, const std::vector<std::string>& expected) {

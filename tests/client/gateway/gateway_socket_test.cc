@@ -195,7 +195,7 @@ TEST_F(GatewaySocketTest, TheLargestMessageIsTakenAndALargerOneIsNot) {
   socket.SendOurs(SocketFrameKind::kMessage, std::string(100'000, 'm'));
   EXPECT_EQ(socket.Receive().payload.size(), 100'000 + kSocketFrameHeadBytes);
   socket.SendOurs(SocketFrameKind::kMessage, std::string(100'001, 'm'));
-  ExpectRefused(&socket, 3, "larger", 1009, GatewayEvent::kMessageTooLarge);
+  ExpectRefused(&socket, 3, "too large", 1009, GatewayEvent::kMessageTooLarge);
 }
 
 // Lengths are what a client says: nothing is made as large as that.
@@ -207,7 +207,7 @@ TEST_F(GatewaySocketTest, AFrameThatSaysItIsHugeIsRefusedWhenItHasBecomeTooLarge
   socket.Start(kSilent);
   socket.raw().Send(std::string("\x82\xff\x7f\xff\xff\xff\xff\xff\xff\xff\0\0\0\0", 14));
   socket.raw().Send(std::string(200'000, 'm'));
-  ExpectRefused(&socket, 3, "larger", 1009, GatewayEvent::kMessageTooLarge);
+  ExpectRefused(&socket, 3, "too large", 1009, GatewayEvent::kMessageTooLarge);
 }
 
 TEST_F(GatewaySocketTest, TextIsRefused) {

@@ -56,8 +56,8 @@ TEST_P(BadServersTest, AreRefusedByName) {
 
 INSTANTIATE_TEST_SUITE_P(
     Servers, BadServersTest,
-    ::testing::Values(BadServers{"NoAddress", {"a="}, "not an address"},
-                      BadServers{"Nothing", {""}, "not an address"},
+    ::testing::Values(BadServers{"NoAddress", {"a="}, "has no address"},
+                      BadServers{"Nothing", {""}, "has no address"},
                       BadServers{"NoPort", {"a=h"}, "give HOST:PORT"},
                       BadServers{"PortBeyondAll", {"h:99999"}, "give HOST:PORT"},
                       BadServers{"Space", {"a b=h:1"}, "letters"},

@@ -29,7 +29,7 @@ TEST(ServerPool, CallsBeyondAllChannelsAreRefusedByName) {
     slots.push_back(*std::move(slot));
   }
   EXPECT_THAT(pool.Take("", "").status(),
-              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("4 calls")));
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("4 open calls")));
   slots.pop_back();
   EXPECT_TRUE(pool.Take("", "").ok());
 }

@@ -131,7 +131,8 @@ TEST(FitTargetsTest, MistakesAreNamedInOneLine) {
   refused(With("/version", 7), "version");
   refused(With("/targets/0/at/point_mm", {1, 2}), "/targets/0/at");
   refused(With("/targets/0/weight", 0), "/targets/0/weight");
-  refused(With("/free/0/translation_mm/1", {3, -2}), "bounds of its translation along y cross");
+  refused(With("/free/0/translation_mm/1", {3, -2}),
+          "bounds of its translation along y are reversed");
   refused(With("/free/0/translation_mm", {{1, 2}}), "/free/0/translation_mm");
   refused(With("/coordinate_system", "RAS"), "its coordinate_system is RAS but the plan's is LPS");
   refused(With("/targets/0/at/place", "chin"), "/targets/0/at");

@@ -105,7 +105,7 @@ TEST_F(PlanResolverTest, MeshOfACaseIsReadAndHeldToItsDigest) {
   EXPECT_THAT(std::vector<double>(problem.stiffness.begin(), problem.stiffness.end()), Each(1));
 
   plan["mesh_sha256"] = std::string(64, 'a');
-  EXPECT_THAT(Resolve(plan), IsRefused("head.tfcase: not the mesh that the plan was made for"));
+  EXPECT_THAT(Resolve(plan), IsRefused("head.tfcase: not the plan's mesh"));
   std::filesystem::resize_file(folder_ / "head.tfcase", bytes.size() / 2);
   EXPECT_THAT(Resolve(plan), IsRefused("head.tfcase"));
   std::filesystem::remove(folder_ / "head.tfcase");
@@ -120,7 +120,7 @@ TEST_F(PlanResolverTest, MeshFileIsHeldToTheDigestThatServersNameItBy) {
   plan["mesh_sha256"] = ViewMeshPayload(bar_.positions(), bar_.tets(), {stiffness}).Sha256();
   EXPECT_THAT(Resolve(plan).status(), IsOk());
   plan["mesh_sha256"] = std::string(64, '0');
-  EXPECT_THAT(Resolve(plan), IsRefused("mesh.vtu: not the mesh that the plan was made for"));
+  EXPECT_THAT(Resolve(plan), IsRefused("mesh.vtu: not the plan's mesh"));
 }
 
 TEST_F(PlanResolverTest, BoxIsClosed) {
@@ -347,7 +347,7 @@ TEST_F(TissueRangesTest, WhatDoesNotFitTheMeshIsNamed) {
   std::iota(pa.begin(), pa.end(), 1000);
   WriteMesh(bar_, pa);
   EXPECT_THAT(Ranges({{"youngs_modulus_factor_95", 2}}),
-              IsRefused("more than 16 kinds of tissue; name a cell array of labels"));
+              IsRefused("more than 16 kinds of tissue; use a cell array of labels"));
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ TEST(MaterialConversionTest, RangesThatAreNoneAreRefused) {
                               std::numeric_limits<double>::infinity()}) {
     bad = good;
     bad.set_factors_95(1, factor);
-    refused(bad, "a factor is 1 to 10");
+    refused(bad, "a factor must be 1 to 10");
   }
   bad = good;
   bad.clear_factors_95();

@@ -226,7 +226,7 @@ TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItE
   *cancelled = true;
   registry_->CancelWait(cancelled);
   // The worker has not begun.
-  EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+  EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
   EXPECT_THAT(Create({"", "", "chosen"}).get(), StatusIs(absl::StatusCode::kAlreadyExists))
       << "another request must wait";
   go.set_value();
@@ -282,7 +282,7 @@ TEST_F(SessionRegistryTest, ASessionThatNobodyWaitsForAnyMoreEndsThoughItIsMade)
   // After its last stage: too late to stop early.
   store_.before_create = [&] { registry_->CancelWait(cancelled); };
   EXPECT_THAT(Create({}, cancelled).get(),
-              StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+              StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
   Drain();
   EXPECT_EQ(registry_->size(), 0);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);

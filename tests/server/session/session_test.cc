@@ -158,7 +158,7 @@ TEST_F(SessionTest, ACancelledCreationLeavesNothingWhereverItStops) {
       stages = 0;
       const auto session = Create(record, Cancellation([&] { return ++stages == stop_at; }));
       if (session.ok()) break;
-      ASSERT_THAT(session, StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+      ASSERT_THAT(session, StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
       EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
     }
     EXPECT_GE(stages, 3);

@@ -323,7 +323,7 @@ TEST_F(SharedPreparationTest, CancelledAnswersLeaveNothing) {
   ASSERT_THAT(Make(DeformationModel::kLinearElastic), IsOk());
   const int64_t held = preparation_.bytes_held();
   EXPECT_THAT(Respond(Request(1.0), Cancellation([] { return true; })),
-              StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+              StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
   EXPECT_EQ(preparation_.bytes_held(), held);
   EXPECT_EQ(budget_.reserved_bytes(), held);
 }

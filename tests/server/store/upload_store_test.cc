@@ -150,8 +150,9 @@ TEST_F(UploadStoreTest, AllPartsTogetherHaveALimit) {
   const UploadAnnouncement second = AnnouncementOf(SamplePayload(2));
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Begin(second), IsOk());
-  EXPECT_THAT(store_->Begin(AnnouncementOf(SamplePayload(3))),
-              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("2 meshes")));
+  EXPECT_THAT(
+      store_->Begin(AnnouncementOf(SamplePayload(3))),
+      StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("2 incomplete mesh uploads")));
   ASSERT_THAT(store_->Append(name_, 0, "012345"), IsOk());
   EXPECT_THAT(store_->Append(second.sha256, 0, "01234"),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("10 bytes")));

@@ -116,7 +116,7 @@ TEST_F(DeviceLoginTest, AProviderOfAnotherNameIsNamedWithTheExpectedOne) {
       HasSubstr("issuer is https://b/, and --issuer says https://a; give --issuer https://b/"));
   answers_ = {HttpAnswer{200, R"({"issuer": "https://a/{tenantid}/v2.0"})"}};
   EXPECT_THAT(std::string(Run().status().message()),
-              HasSubstr("https://a/{tenantid}/v2.0, which stands for every tenant"));
+              HasSubstr("https://a/{tenantid}/v2.0, shared by all tenants"));
   answers_ = {HttpAnswer{200, R"({"issuer": "https://\u001b[2J"})"}};
   EXPECT_THAT(std::string(Run().status().message()), HasSubstr("does not name an issuer"));
 }

@@ -81,7 +81,7 @@ TEST(CheckLoginUrl, RefusesWhereSecretsWouldBeSeen) {
         "https://a/" + std::string(3000, 'x')}) {
     const absl::Status status = CheckLoginUrl("--issuer", url);
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << url;
-    EXPECT_THAT(std::string(status.message()), HasSubstr("--issuer is no URL"));
+    EXPECT_THAT(std::string(status.message()), HasSubstr("--issuer is not a login URL"));
   }
 }
 
@@ -90,7 +90,7 @@ TEST(CurlExchange, SaysWhoCannotBeAskedAndNotWhat) {
   const auto answer =
       CurlExchange()({.url = "http://127.0.0.1:9/?secret", .form = {{"code", "secret"}}});
   EXPECT_EQ(answer.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_THAT(std::string(answer.status().message()), HasSubstr("127.0.0.1 cannot be asked"));
+  EXPECT_THAT(std::string(answer.status().message()), HasSubstr("127.0.0.1 cannot be reached"));
   EXPECT_THAT(std::string(answer.status().message()), ::testing::Not(HasSubstr("secret")));
 }
 

@@ -32,7 +32,7 @@ TEST_F(TokenCommandTest, OnlyItsOwnerReadsAPrivateKeyAndNothingIsWrittenOver) {
             Permissions::owner_read | Permissions::owner_write);
   const std::string before = Read("keys/private.pem");
   EXPECT_THAT(Run({"token", "keygen", "--out", Path("keys")}),
-              FailsWith(1, HasSubstr("keys/private.pem is there already")));
+              FailsWith(1, HasSubstr("keys/private.pem exists")));
   EXPECT_EQ(Read("keys/private.pem"), before);
 }
 

@@ -118,7 +118,7 @@ TEST_F(CompareTest, CoordinatesThatAreNotFiniteAreRefused) {
   ASSERT_OK_AND_ASSIGN(bar.mesh, TetMesh::Create(positions, bar.mesh.tets()));
   ASSERT_THAT(WriteTetMesh(Path("nan.vtu"), bar), IsOk());
   EXPECT_THAT(Run({"compare", "a.vtu", "nan.vtu"}),
-              FailsWith(1, HasSubstr("nan.vtu has coordinates")));
+              FailsWith(1, HasSubstr("nan.vtu has non-finite coordinates")));
 }
 
 }  // namespace

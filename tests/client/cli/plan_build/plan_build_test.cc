@@ -148,7 +148,7 @@ TEST_F(PlanBuildTest, PlanThatMissesARequirementIsKeptAndNotReady) {
 
   const ProcessResult accepted = Build({"--out", "accepted", "--no-pictures", "--accept-defects"});
   EXPECT_THAT(accepted, Succeeds());
-  EXPECT_THAT(accepted.out, AllOf(HasSubstr("NOT ready"), HasSubstr("mind    The mesh lacks"),
+  EXPECT_THAT(accepted.out, AllOf(HasSubstr("NOT ready"), HasSubstr("mind    The mesh misses"),
                                   HasSubstr("% of the upper lip: ")));
   EXPECT_TRUE(Read("head/report.json") == Read("accepted/report.json"));
 }

@@ -104,9 +104,9 @@ TEST_F(PlanFitTest, JsonTellsAllWithUnitsAndNotice) {
 TEST_F(PlanFitTest, TargetsThatAreNotReachedEndWithOneAndThePlanIsWritten) {
   targets_["targets"][0]["by_mm"] = 30;
   EXPECT_THAT(Fit({"--out", "fitted.json"}),
-              FailsWith(1, AllOf(HasSubstr("1 of 1 targets cannot be reached: missed most is "
+              FailsWith(1, AllOf(HasSubstr("1 of 1 targets cannot be reached: largest miss: "
                                            "\"side\" by "),
-                                 HasSubstr("bounds hold top"))));
+                                 HasSubstr("active bounds: top"))));
   EXPECT_THAT(Files(), ElementsAre("bar.vtu", "fitted.json", "plan.json", "targets.json"));
   const ProcessResult accepted = Fit({"--accept-misses"});
   EXPECT_THAT(accepted, Succeeds());

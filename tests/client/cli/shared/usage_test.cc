@@ -43,7 +43,7 @@ TEST_F(UsageTest, SolverThreadsOutOfRangeAreRefusedInOneLine) {
                 FailsWith(2, AllOf(HasSubstr("--solver-threads"), HasSubstr(number))));
   }
   EXPECT_THAT(Run({"compare", "a.vtu", "b.vtu", "--solver-threads", "2"}),
-              FailsWith(2, HasSubstr("--solver-threads: is for a plan")));
+              FailsWith(2, HasSubstr("--solver-threads: applies to a plan")));
 }
 
 TEST_F(UsageTest, HelpTeachesByExamples) {

@@ -135,8 +135,9 @@ TEST(DicomFile, WhatIsNoDicomFileIsRefused) {
   WriteTestFile(folder / "cut", BytesOf(series.files[0]).substr(0, 700));
   EXPECT_THAT(LoadDicomHeader(folder / "cut").status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("damaged, truncated")));
-  EXPECT_THAT(LoadDicomHeader(series.files[0], {.max_file_bytes = 1000}).status(),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("more than the 1000")));
+  EXPECT_THAT(
+      LoadDicomHeader(series.files[0], {.max_file_bytes = 1000}).status(),
+      StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("more than the limit of 1000")));
 }
 
 TEST(DicomFile, ItemsWithinItemsEndAtALimitAndNotWithTheStack) {

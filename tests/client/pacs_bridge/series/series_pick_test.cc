@@ -133,9 +133,9 @@ INSTANTIATE_TEST_SUITE_P(
                [](Images* i) {
                  for (InstanceHeader& image : *i) image.image_type = "ORIGINAL\\PRIMARY\\LOCALIZER";
                },
-               "localiser"},
+               "localizer"},
         Defect{"SomeWithoutHounsfield", [](Images* i) { (*i)[7].rescale_slope.reset(); },
-               "1 of its 200 images do not say how their values become Hounsfield units"},
+               "1 of its 200 images have no Hounsfield calibration"},
         Defect{"MultiFrame",
                [](Images* i) {
                  for (InstanceHeader& image : *i) {
@@ -149,7 +149,7 @@ INSTANTIATE_TEST_SUITE_P(
                "derived"},
         Defect{"Magnetic", [](Images* i) { i->front().modality = "MR"; }, "no Hounsfield units"},
         Defect{"HostileModality", [](Images* i) { i->front().modality = "PLANTED\nx"; },
-               "of modality unknown"},
+               "its modality is unknown"},
         Defect{"ConeBeam",
                [](Images* i) {
                  for (InstanceHeader& image : *i) image.rescale_slope.reset();

@@ -66,7 +66,7 @@ TEST_F(ExportWorkTest, ABandThatCannotBeToldIsSaidAndTheReportGoesWithoutIt) {
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
   EXPECT_THAT(warnings_, ::testing::ElementsAre(
-                             HasSubstr("without its band of uncertainty: ranges: 3 tets of 16")));
+                             HasSubstr("without a band of uncertainty: ranges: 3 tets of 16")));
 }
 
 TEST_F(ExportWorkTest, ABandThatIsNotKnownIsNoReasonToWarn) {
@@ -100,7 +100,7 @@ TEST_F(ExportWorkTest, APredictionOfAnotherMeshIsRefused) {
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFailed);
   EXPECT_TRUE(Stored().empty());
-  EXPECT_THAT(Updates(), Contains(HasSubstr("FAILED 0 the prediction is of another mesh")));
+  EXPECT_THAT(Updates(), Contains(HasSubstr("FAILED 0 the prediction has a different mesh")));
 }
 
 TEST_F(ExportWorkTest, WhatIsDrawnOfAnExportThatHasFailedMeanwhileIsRemoved) {
@@ -151,7 +151,7 @@ TEST_F(ExportWorkTest, ACaseOfAnotherBridgeIsLeftToItWhichIsSaid) {
   told.set_state(v1::EXPORT_STATE_WAITING);
   EXPECT_THAT(work.Take(told), IsOk());
   EXPECT_TRUE(exports_.List()->empty());
-  EXPECT_THAT(said, ::testing::ElementsAre(HasSubstr("exports/1 is of a case of another bridge")));
+  EXPECT_THAT(said, ::testing::ElementsAre(HasSubstr("exports/1 has a case of another bridge")));
 }
 
 TEST_F(ExportWorkTest, APacsThatIsDownIsWaitedFor) {

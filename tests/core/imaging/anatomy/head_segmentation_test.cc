@@ -49,7 +49,7 @@ TEST(HeadSegmentationTest, ASkullWithoutSkinIsRefused) {
   HeadPhantomOptions options;
   options.with_soft_tissue = false;
   EXPECT_THAT(SegmentHead(HeadPhantom(options)),
-              StatusIs(kInvalid, AllOf(HasSubstr("not skin"), HasSubstr("a bare skull"))));
+              StatusIs(kInvalid, AllOf(HasSubstr("no skin"), HasSubstr("a bare skull"))));
 }
 
 TEST(HeadSegmentationTest, BoneThatLiesBareOnASolidIsRefused) {

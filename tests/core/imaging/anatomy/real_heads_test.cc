@@ -314,7 +314,7 @@ TEST(RealHeadsTest, APlasticSkullIsRefusedForWantOfSkin) {
   ASSERT_TRUE(files.ok());
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, ReadCtVolume(files.Path("S2010")));
   ASSERT_OK_AND_ASSIGN(const HuGrid ct, ResampleIsotropic(volume, 2));
-  EXPECT_THAT(SegmentHead(ct), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not skin")));
+  EXPECT_THAT(SegmentHead(ct), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no skin")));
 }
 
 }  // namespace

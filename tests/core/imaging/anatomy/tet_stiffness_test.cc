@@ -227,7 +227,7 @@ TEST(TetStiffnessTest, WhatDoesNotFitIsRefused) {
   const GridGeometry grid = Grid(20, 1);
   const HuGrid hu(grid, 50);
   EXPECT_THAT(ComputeTetStiffness(Cube(1, 18, 4), hu, LabelGrid(grid)),
-              StatusIs(kInvalid, HasSubstr("tet 0 lies outside the CT")));
+              StatusIs(kInvalid, HasSubstr("tet 0 is outside the CT")));
   EXPECT_THAT(ComputeTetStiffness(Cube(1, 5, 4), hu, LabelGrid(Grid(20, 1.1))),
               StatusIs(kInvalid, HasSubstr("same grid")));
   Positions positions = Cube(1, 5, 4).positions();

@@ -178,7 +178,7 @@ TEST_F(DicomVolumeTest, OtherSeriesAndOtherFilesAreLeftAsideWithANote) {
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
   EXPECT_EQ(volume.size[2], 9);
   EXPECT_THAT(volume.provenance.notes,
-              ElementsAre(HasSubstr("series 1 (1 files; the first is a localiser"),
+              ElementsAre(HasSubstr("series 1 (1 files; the first is a localizer"),
                           HasSubstr("1 files that are not DICOM")));
 }
 
@@ -284,10 +284,9 @@ TEST_F(DicomVolumeTest, SliceThatIsMissingBecauseItsFileIsDamagedIsRefused) {
   series.erase(series.begin() + 3);
   WriteSeries(series);
   Write("zzz", std::string(100, '\0'));
-  EXPECT_THAT(Read(),
-              StatusIs(kInvalid, AllOf(HasSubstr("file 9 of the folder is a DICOM file that "
-                                                 "is truncated"),
-                                       HasSubstr("1 slice is missing"))));
+  EXPECT_THAT(Read(), StatusIs(kInvalid, AllOf(HasSubstr("file 9 of the folder is a truncated "
+                                                         "or damaged DICOM file"),
+                                               HasSubstr("1 slice is missing"))));
   WriteSeries(PhantomSeries());  // nothing is missing beside it
   ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
   EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("truncated or damaged")));
@@ -433,7 +432,8 @@ TEST_F(DicomVolumeTest, NoOffsetIsAdvisedWhereOtherSlicesStateARescale) {
   CtReadOptions with_offset;
   with_offset.hu_offset = -1024;
   for (const CtReadOptions& options : {CtReadOptions(), with_offset}) {
-    Expect(Read(options), "become HU (RescaleSlope, RescaleIntercept); export the series again");
+    Expect(Read(options),
+           "calibration to HU (RescaleSlope, RescaleIntercept); export the series again");
   }
 }
 

@@ -149,7 +149,7 @@ TEST_F(MeshPreparationTest, ACancelledPreparationStopsAtItsNextStageAndMayBeAske
     const Cancellation cancellation([&] { return ++stages == stop_at; });
     const absl::Status status = preparation->Elastic(cancellation).status();
     if (status.ok()) break;
-    EXPECT_THAT(status, StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+    EXPECT_THAT(status, StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
     EXPECT_EQ(stages, stop_at) << "nobody is asked again";
     EXPECT_FALSE(preparation->has_elastic());
   }
@@ -194,7 +194,7 @@ TEST_F(MeshPreparationTest, EveryModelCanBeCancelledBeforeItsFactor) {
     DeformerOptions options;
     options.model = model;
     EXPECT_THAT(CreateDeformer(preparation, options, Cancellation([] { return true; })),
-                StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+                StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
     EXPECT_FALSE(preparation->has_laplacian() || preparation->has_elastic());
   }
 }

@@ -166,7 +166,7 @@ TEST_F(FitProblemTest, BadFreedomsAreNamed) {
       [&] {
         freedom().translation[1] = {2, -2};
       },
-      "the bounds of its translation along y cross");
+      "the bounds of its translation along y are reversed");
   refused([&] { freedom().translation[1] = {-2, 1001}; }, "translation along y exceed 1000 mm");
   refused([&] { freedom().rotation[0] = {kNan, 1}; }, "rotation about x is NaN or infinite");
   refused([&] { freedom().pivot_mm = Vector3d(0, kNan, 0); }, "its pivot_mm is NaN or infinite");

@@ -287,7 +287,7 @@ TEST(ResponseBasisProgressTest, ColumnsAreCountedUpToTheLastAndTheWorkCanEndBetw
     const Cancellation cancellation(
         [&] { return !steps.empty() && steps[steps.size() - 2] >= last; });
     EXPECT_THAT(CreateResponseBasis(preparation, vertices, options, cancellation),
-                StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancelled")));
+                StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
     EXPECT_LT(steps[steps.size() - 2], all);
   }
 }

@@ -238,8 +238,8 @@ TEST_F(TetFormatsTest, FormatBehindAnotherEndingIsNamedInOneLine) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("it is a MEDIT mesh")));
   EXPECT_THAT(Read("a.node", Slurp(TwoTets("legacy_ascii.vtk"))),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("it is a legacy VTK file")));
-  EXPECT_THAT(Read("a.txt", gmsh),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("none of those")));
+  EXPECT_THAT(Read("a.txt", gmsh), StatusIs(absl::StatusCode::kInvalidArgument,
+                                            HasSubstr("not one of the supported ones")));
   EXPECT_THAT(Read("a.stl", "solid a\nendsolid a\n"),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("a mesh of tets is needed")));
 }

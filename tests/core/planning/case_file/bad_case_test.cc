@@ -139,7 +139,7 @@ TEST(BadCaseTest, WhatFollowsTheEndIsRefused) {
   EXPECT_THAT(ParseCase(GoodCase() + "more"), StatusIs(kInvalid, HasSubstr("and has")));
   std::string longer = GoodCase() + "more";
   SetWord(&longer, 8, static_cast<uint32_t>(longer.size()));
-  EXPECT_THAT(ParseCase(longer), StatusIs(kInvalid, HasSubstr("follows")));
+  EXPECT_THAT(ParseCase(longer), StatusIs(kInvalid, HasSubstr("data after its BIN chunk")));
 }
 
 // Of any bytes: a case that can be written again, or a refusal in one line.

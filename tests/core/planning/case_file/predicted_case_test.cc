@@ -75,7 +75,7 @@ TEST_F(PredictedCaseTest, APredictionOfAnotherMeshIsRefused) {
 
 TEST_F(PredictedCaseTest, ASegmentWithoutAPoseIsRefused) {
   EXPECT_THAT(PredictCase(case_, rest_, {}).status().message(),
-              HasSubstr("no pose of the handle \"top\""));
+              HasSubstr("no pose for the handle \"top\""));
 }
 
 TEST_F(PredictedCaseTest, WhatIsNoNumberIsRefused) {

@@ -188,7 +188,7 @@ TEST(BadHeadsTest, TeethThatMetalHidesWhollyNeedThePlaneOfTheRecipe) {
   const RawVolume hidden = WithTeethHiddenByMetal(BundledHead());
   EXPECT_THAT(Build(hidden), StatusIs(absl::StatusCode::kInvalidArgument,
                                       AllOf(HasSubstr("cm3) hides the teeth"),
-                                            HasSubstr("set \"occlusal_plane\" in the recipe"))));
+                                            HasSubstr("give \"occlusal_plane\" in the recipe"))));
   Recipe recipe = CoarseRecipe();
   ASSERT_OK_AND_ASSIGN(const PlanBuild with_teeth, Build(BundledHead()));
   recipe.occlusal_plane = with_teeth.parts.occlusal_plane;

@@ -101,7 +101,7 @@ TEST_F(PlanBuildCallTest, CancelledCallHasEndedItsWork) {
   const auto text = CallPlanBuild(
       request_, {.tell = [&](absl::string_view, double) { close(std::exchange(cancel[1], -1)); },
                  .cancel = cancel[0]});
-  EXPECT_THAT(text, StatusIs(absl::StatusCode::kCancelled, HasSubstr("ended")));
+  EXPECT_THAT(text, StatusIs(absl::StatusCode::kCancelled, HasSubstr("stopped")));
   EXPECT_THAT(Children(), IsEmpty());
   close(cancel[0]);
 }

@@ -29,10 +29,10 @@ TEST(CautionsTest, AWholeHeadNeedsNone) { EXPECT_THAT(Cautions(WholeHead()), IsE
 TEST(CautionsTest, WhatIsMissingIsTold) {
   PlanBuild build = WholeHead();
   build.landmarks.nose_prominence_mm = 0.24;
-  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("stands 0.2 mm before")));
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("is 0.2 mm in front of")));
   build.landmarks.menton.z() = -97;
   EXPECT_THAT(Cautions(build),
-              ElementsAre(HasSubstr("nose"), HasSubstr("ends 4 mm under the bone of the chin")));
+              ElementsAre(HasSubstr("nose"), HasSubstr("ends 4 mm below the bony chin")));
 }
 
 TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {
@@ -45,7 +45,7 @@ TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {
 TEST(CautionsTest, TetsThatStayTornAreTold) {
   PlanBuild build = WholeHead();
   build.num_inverted = 3;
-  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("3 tets turn inside out")));
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("3 tets are inverted")));
 }
 
 TEST(CautionsTest, TeethThatWereCutApartAreToldUnlessTheRecipeSaysWhere) {

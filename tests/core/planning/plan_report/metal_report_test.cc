@@ -42,10 +42,9 @@ TEST(MetalReportTest, AMouthWithoutMetalNeedsNoWord) {
 }
 
 TEST(MetalReportTest, TheCautionSaysHowMuchAndWhere) {
-  EXPECT_THAT(
-      MetalCautions(WithMetal()),
-      ElementsAre(HasSubstr("3 pieces of 0.9 cm3 together, from z = 2.0 to 16.0 mm. Its streaks "
-                            "were lessened in 8 slices")));
+  EXPECT_THAT(MetalCautions(WithMetal()),
+              ElementsAre(HasSubstr("3 pieces of 0.9 cm3 together, from z = 2.0 to 16.0 mm. Its "
+                                    "artifacts were reduced in 8 slices")));
 }
 
 TEST(MetalReportTest, MuchMetalAsksForPlanes) {

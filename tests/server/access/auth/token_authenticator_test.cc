@@ -205,7 +205,7 @@ std::string SentenceOf(const std::string& name, const Json& value) {
 TEST(RefusedTokenTest, ATokenWithAGoodSignatureIsToldWhatIsExpectedOfIt) {
   EXPECT_THAT(SentenceOf("iss", "https://sts.example/1/"),
               HasSubstr("issuer is \"https://sts.example/1/\"; this server accepts only tokens of "
-                        "\"https://login.example\" only"));
+                        "\"https://login.example\""));
   EXPECT_THAT(SentenceOf("iss", nullptr), HasSubstr("issuer is \"null\""));
   EXPECT_THAT(SentenceOf("aud", "another"),
               HasSubstr("audience is \"another\", and this server is \"tissueform\""));
@@ -247,7 +247,7 @@ TEST(RefusedTokenTest, NothingIsSaidOfATokenWhoseSignatureIsNotVerified) {
   }
   EXPECT_THAT(
       std::string(Ask(authenticator.get(), OtherEcKey().MakeToken(claims)).status().message()),
-      HasSubstr("not one of \"https://login.example\""));
+      HasSubstr("does not belong to \"https://login.example\""));
 }
 
 struct GoodToken {
