@@ -198,7 +198,7 @@ describe("in Chromium", () => {
   test("where the plan knows how uncertain the material is, no number stands without its band", async () => {
     const { page } = await openPage("banded.html");
     await answered(page as Opened);
-    await page.getByText(/Largest movement of the skin: [0-9.]+ mm, [0-9.]+ to [0-9.]+ in 95 of 100 cases/).waitFor();
+    await page.getByText(/Largest movement of the skin: [0-9.]+ mm, [0-9.]+ to [0-9.]+ \(95 % interval/).waitFor();
   });
 
   test("beyond what the answers reach it says so and keeps the last picture", async () => {

@@ -101,7 +101,7 @@ describe("a planner", () => {
     await page.locator(".legend").waitFor({ state: "visible" });
     const { legend } = await state(page);
     expect(legend?.largestMm).toBeGreaterThan(6);
-    await page.locator(".legend").getByText(/^largest \d+\.\d\d mm, in 95 of 100 cases \d+\.\d\d to \d+\.\d\d$/).waitFor();
+    await page.locator(".legend").getByText(/^largest \d+\.\d\d mm, 95 % interval \d+\.\d\d to \d+\.\d\d$/).waitFor();
     expect(legend?.mostMm).toBeGreaterThanOrEqual(legend?.largestMm ?? Infinity);
     await page.getByLabel("Color by").selectOption({ label: "Difference to Gradient field" });
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title === "Difference to Gradient field");
@@ -137,7 +137,7 @@ describe("a planner", () => {
     const stored = page.locator(".predictions li", { hasText: "Eight <b>forward</b>" });
     await stored.getByRole("button", { name: /^Send .* to the PACS$/ }).click();
     await stored.getByText("PACS: waiting for the bridge").waitFor();
-    await stored.getByRole("button", { name: /^Take .* back/ }).click();
+    await stored.getByRole("button", { name: /^Withdraw / }).click();
     await stored.getByText("PACS: waiting for the bridge").waitFor({ state: "detached" });
     await moved(page, 6, 10);
   });

@@ -281,7 +281,7 @@ TEST_F(SharedPreparationTest, WhatIsRefusedLeavesWhatWasThereAndMayBeAskedForAga
     const MemoryReservation rest =
         *budget_.Reserve(kPlenty - budget_.reserved_bytes() - 1000, "rest of the machine");
     EXPECT_THAT(Make(DeformationModel::kNeoHookean),
-                StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("no room")));
+                StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("no memory for")));
     EXPECT_EQ(preparation_.bytes_held(), held);
   }
   EXPECT_THAT(Make(DeformationModel::kNeoHookean), IsOk());

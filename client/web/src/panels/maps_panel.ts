@@ -153,7 +153,7 @@ function mapLegend(legend: MapLegend | null): ShownLegend | null {
   return legend === null ? null : { title: legend.title, ticksMm: [0, legend.mostMm / 2, legend.mostMm], note: largestText(legend) };
 }
 
-/** "largest 8.12 mm, in 95 of 100 cases 7.50 to 8.80", the second where it is known. */
+/** "largest 8.12 mm, 95 % interval 7.50 to 8.80", the second where it is known. */
 export function largestText({ largestMm, band }: Pick<MapLegend, "largestMm" | "band">): string {
   const range = band === null ? "" : `, 95 % interval ${formatNumber(band.lowestMm, 2)} to ${formatNumber(band.highestMm, 2)}`;
   return `largest ${formatNumber(largestMm, 2)} mm${range}`;

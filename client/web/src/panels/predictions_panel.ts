@@ -82,7 +82,7 @@ function pacsLine(bench: Workbench, prediction: Prediction): HTMLElement | null 
     attributes: { "aria-label": `Send ${prediction.title} to the PACS` },
   });
   const withdraw = async () => (mayTakeBack(entry) ? bench.pacs.takeBack(entry) : undefined);
-  const takeBack = button("Take back", () => void whileBusy(takeBack, withdraw, onError), {
+  const takeBack = button("Withdraw", () => void whileBusy(takeBack, withdraw, onError), {
     attributes: { "aria-label": `Withdraw ${prediction.title} from the PACS` },
   });
   return el("div", { class: "pacs" }, [

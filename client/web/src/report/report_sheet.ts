@@ -59,7 +59,7 @@ function measureTable(bench: Workbench): HTMLElement {
     const band = result.kind === "value" ? bandText(result.band) : "";
     return [`${result.definition.title}, ${unitText(result)}`, before, why === "" ? after : why, band, change, normText(result.definition.norm).replace("norm ", "")];
   });
-  return table(["Measure", "Before", "After", "95 of 100", "Change", "Norm"], rows);
+  return table(["Measure", "Before", "After", "95 % interval", "Change", "Norm"], rows);
 }
 
 /** Which model's answer the face is that is shown, how near it is to that model's full one, and who gave it. */

@@ -139,7 +139,7 @@ TEST_F(PlanFitTest, BadTargetsAreOneLineAndNothingIsWritten) {
                                  HasSubstr(" mm off the skin"))));
   EXPECT_THAT(FitWith("/free/0/handle", "jaw"), FailsWith(1, HasSubstr("it has top")));
   EXPECT_THAT(FitWith("/targets/0/weight", 0), FailsWith(1, HasSubstr("/targets/0/weight")));
-  EXPECT_THAT(FitWith("/free/0/translation_mm/0", {2, 1}), FailsWith(1, HasSubstr("cross")));
+  EXPECT_THAT(FitWith("/free/0/translation_mm/0", {2, 1}), FailsWith(1, HasSubstr("are reversed")));
   EXPECT_THAT(FitWith("/free/0/rotation_vector_deg/0", {-1700, 1700}),
               FailsWith(1, HasSubstr("rotation about x exceed 90 degrees")));
   EXPECT_THAT(FitWith("/targets/0/by_mm", "far"), FailsWith(1, HasSubstr("/targets/0/by_mm")));

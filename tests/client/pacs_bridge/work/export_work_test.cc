@@ -96,7 +96,7 @@ TEST_F(ExportWorkTest, APredictionOfAnotherMeshIsRefused) {
   Ask("exports/1", series);
   Confirm("exports/1");
   EXPECT_THAT(Work("exports/1"),
-              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("another mesh")));
+              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("a different mesh")));
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFailed);
   EXPECT_TRUE(Stored().empty());
