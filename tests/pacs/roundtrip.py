@@ -137,7 +137,7 @@ def moment_of(programs, pattern):
 def print_times(programs):
     """What the bridge adds to `plan build`."""
     ended, chosen, built, published = (moment_of(programs, pattern) for pattern in (
-        r"association \d+ has ended: 93 objects", "is chosen", "chosen -> built", "packed -> published"))
+        r"association \d+ ended: 93 objects", "is chosen", "chosen -> built", "packed -> published"))
     print(f"     last slice to published case: {published - ended:.1f} s, of which plan build {built - chosen:.1f} s; "
           f"beyond it {published - built + chosen - ended:.1f} s", flush=True)
 
