@@ -42,10 +42,10 @@ test("seven pictures", async () => {
   await takeSegment(page, "Lower jaw");
   await typeMove(page, "Forward", "8");
   await moved(page, 6, 12);
-  await page.getByRole("button", { name: "Rest shape" }).click();
+  await page.getByRole("button", { name: "Pre-op ghost" }).click();
   await page.getByRole("button", { name: "Left", exact: true }).click();
   await picture(page, "jaw-8-mm-forward");
-  await page.getByRole("button", { name: "Rest shape" }).click();
+  await page.getByRole("button", { name: "Pre-op ghost" }).click();
 
   await page.getByRole("button", { name: "3/4" }).click();
   await page.getByLabel("Opacity of the skin").fill("0.35");
@@ -123,7 +123,7 @@ test("measures, a target, the band and the bite", async () => {
   await open("Measures");
 
   await page.getByRole("button", { name: "Reset" }).click();
-  await page.getByRole("button", { name: "Rest shape" }).click();
+  await page.getByRole("button", { name: "Pre-op ghost" }).click();
   await page.getByRole("button", { name: "Left", exact: true }).click();
   await open("Soft-tissue targets");
   await page.getByLabel("or a place").selectOption({ label: "Chin" });
@@ -147,7 +147,7 @@ test("measures, a target, the band and the bite", async () => {
   await picture(page, "targeted-chin");
   await page.getByRole("button", { name: "Reject", exact: true }).click();
   await open("Soft-tissue targets");
-  await page.getByRole("button", { name: "Rest shape" }).click();
+  await page.getByRole("button", { name: "Pre-op ghost" }).click();
 
   await open("Jaw and occlusion");
   await typeMove(page, "Forward", "6");
@@ -209,7 +209,7 @@ test("frames of an animation: the lower jaw 8 mm forward and back", async () => 
   await page.emulateMedia({ colorScheme: "dark" });
   await takeSegment(page, "Lower jaw");
   await page.getByLabel("Opacity of the skin").fill("0.55");
-  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.gizmo.setVisible(false));
+  await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.gizmo.hide("picture", true));
   const steps = 14;
   for (let step = 0; step <= steps; ++step) {
     const forward = 4 * (1 - Math.cos((Math.PI * step) / steps));
@@ -294,7 +294,7 @@ test("a drag while every byte is 150 ms late, both ways, as it was seen", async 
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind === "ready");
     await takeSegment(page, "Lower jaw");
     await page.getByRole("button", { name: "Left", exact: true }).click();
-    await page.getByRole("button", { name: "Rest shape" }).click();
+    await page.getByRole("button", { name: "Pre-op ghost" }).click();
     const slider = page.getByRole("slider", { name: /^Forward/ });
     await slider.scrollIntoViewIfNeeded();
     await page.locator(".notice").waitFor({ state: "hidden" });

@@ -92,14 +92,14 @@ export function plannerPage(
 }
 
 function gizmoModes(bench: Workbench, help: HTMLDialogElement): HTMLElement {
-  const shift = button("Shift", () => set(true));
-  const turn = button("Turn", () => set(false));
-  const set = (isShift: boolean) => {
-    bench.gizmo.setMode(isShift ? "translate" : "rotate");
-    shift.setAttribute("aria-pressed", String(isShift));
-    turn.setAttribute("aria-pressed", String(!isShift));
+  const move = button("Move", () => set(true));
+  const rotate = button("Rotate", () => set(false));
+  const set = (isMove: boolean) => {
+    bench.gizmo.setMode(isMove ? "translate" : "rotate");
+    move.setAttribute("aria-pressed", String(isMove));
+    rotate.setAttribute("aria-pressed", String(!isMove));
   };
   set(true);
-  const keys = button("Keys", () => help.showModal());
-  return el("div", { class: "gizmo-modes", attributes: { role: "group", "aria-label": "Gizmo" } }, [shift, turn, keys]);
+  const keys = button("Shortcuts", () => help.showModal());
+  return el("div", { class: "gizmo-modes", attributes: { role: "group", "aria-label": "Gizmo" } }, [move, rotate, keys]);
 }

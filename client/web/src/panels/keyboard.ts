@@ -100,7 +100,7 @@ export function bindKeys(bench: Workbench, help: HTMLDialogElement): void {
 /** The keys in a dialog. */
 export function helpDialog(): HTMLDialogElement {
   const rows = HELP.flatMap(([keys, text]) => [el("dt", { text: keys }), el("dd", { text })]);
-  const dialog = el("dialog", { attributes: { "aria-label": "Keys" } }, [
+  const dialog = el("dialog", { attributes: { "aria-label": "Keyboard shortcuts" } }, [
     el("h2", { text: "Keyboard shortcuts, while the picture has the focus" }),
     el("dl", {}, rows),
     button("Close", () => dialog.close()),

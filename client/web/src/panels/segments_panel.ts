@@ -115,7 +115,7 @@ function pivotField(bench: Workbench): HTMLElement {
     const handle = bench.plan.handles[bench.selected.value];
     return pivotChoices(handle, bench.file.manifest.landmarks, bench.view.head.segmentMiddle(handle.name));
   };
-  const field = select("Turns about", choices(), (point) => bench.plan.setPivot(bench.selected.value, point));
+  const field = select("Rotation center", choices(), (point) => bench.plan.setPivot(bench.selected.value, point));
   const show = () => {
     const points = choices();
     const pivot = bench.plan.pivot(bench.selected.value);

@@ -13,7 +13,7 @@ export function viewBar(view: HeadView): HTMLElement {
   const views = (Object.keys(VIEWS) as ViewName[]).map((name) =>
     button(VIEWS[name].label, () => view.look(name), { attributes: { title: `Key ${VIEWS[name].key}` } }),
   );
-  const ghost = button("Rest shape", () => {
+  const ghost = button("Pre-op ghost", () => {
     const isOn = ghost.getAttribute("aria-pressed") !== "true";
     ghost.setAttribute("aria-pressed", String(isOn));
     view.setGhost(isOn);
