@@ -5,12 +5,13 @@
 
     tests/scripts/check_style.py
 
-Every source file begins with the two lines of copyright and licence (after a #! line); headers have `#pragma once`;
+Every source file begins with the two lines of copyright and licence (after a #! line, which only executable files have); headers have `#pragma once`;
 no file holds a mark of unfinished work, a tab, a blank at the end of a line or more than 600 lines; processes are made
 in core/base/process only (tests may make their own). No two headers define a type of the same name in one namespace:
 a program that links both would break the one-definition rule.
 """
 
+import os
 import pathlib
 import re
 import sys
@@ -82,6 +83,9 @@ def main():
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".h":
             headers.append((name, text))
+        if text.startswith("#!") and not os.access(path, os.X_OK):
+            print(f"{name}:1: begins with #!, but cannot be executed: chmod +x {name}", file=sys.stderr)
+            count += 1
         for number, message in errors_of(name, text):
             print(f"{name}:{number}: {message}", file=sys.stderr)
             count += 1
