@@ -217,7 +217,7 @@ test("frames of an animation: the lower jaw 8 mm forward and back", async () => 
     await moved(page, 0.6 * forward - 0.05, 1.5 * forward + 0.05);
     await page.evaluate(() => new Promise<void>((done) => (globalThis as unknown as Hook).tissueform.view.stage.invalidate(done)));
     await page.waitForTimeout(150);
-    await page.screenshot({ path: join(FOLDER, `drag-${String(step).padStart(2, "0")}.png`), clip: { x: 150, y: 90, width: 1130, height: 510 } });
+    await page.screenshot({ path: join(FOLDER, `drag-${String(step).padStart(2, "0")}.png`), clip: { x: 120, y: 60, width: 1160, height: 540 } });
   }
 });
 

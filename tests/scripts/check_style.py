@@ -11,9 +11,9 @@ in core/base/process only (tests may make their own). No two headers define a ty
 a program that links both would break the one-definition rule.
 """
 
-import os
 import pathlib
 import re
+import stat
 import sys
 
 FOLDERS = (".ci", "cmake", "client", "core", "deploy", "proto", "server", "tests")
@@ -51,6 +51,12 @@ def errors_of(name, text):
             yield number, "a tab, or a blank at the end"
 
 
+def errors_of_mode(name, text, mode):
+    """(line, message) where a file that begins with #! may not be executed."""
+    if text.startswith("#!") and not mode & stat.S_IXUSR:
+        yield 1, f"begins with #!, but cannot be executed: chmod +x {name}"
+
+
 def types_of(text):
     """(line, name with its namespace) of the types that a header defines."""
     namespace = ""
@@ -83,10 +89,7 @@ def main():
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".h":
             headers.append((name, text))
-        if text.startswith("#!") and not os.access(path, os.X_OK):
-            print(f"{name}:1: begins with #!, but cannot be executed: chmod +x {name}", file=sys.stderr)
-            count += 1
-        for number, message in errors_of(name, text):
+        for number, message in [*errors_of(name, text), *errors_of_mode(name, text, path.stat().st_mode)]:
             print(f"{name}:{number}: {message}", file=sys.stderr)
             count += 1
     for name, number, message in types_defined_twice(headers):

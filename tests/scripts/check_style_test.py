@@ -50,6 +50,13 @@ class CheckStyleTest(unittest.TestCase):
         for other in ("class Plane;", "enum class Plane : int;", "struct Planes {", "  struct Plane {", "// struct Plane {", "}\nnamespace tissueform::testing {\nclass Plane {"):
             self.assertEqual(twice(plane, f"namespace tissueform {{\n{other}\n"), [], other)
 
+    def test_what_begins_with_a_program_can_be_executed(self):
+        def of_mode(text, mode):
+            return len(list(check_style.errors_of_mode("a.py", text, mode)))
+        self.assertEqual(of_mode("#!/usr/bin/env python3\n", 0o644), 1)
+        self.assertEqual(of_mode("#!/usr/bin/env python3\n", 0o755), 0)
+        self.assertEqual(of_mode("# not a program\n", 0o644), 0)
+
 
 if __name__ == "__main__":
     unittest.main()

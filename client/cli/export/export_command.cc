@@ -40,6 +40,10 @@ struct ExportOptions {
 
 // Before the long work.
 absl::Status CheckExport(const ExportOptions& options) {
+  if (fs::path(options.html).extension() != ".html") {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--html ", options.html, " must end in .html, or no browser opens it as a page"));
+  }
   TF_RETURN_IF_ERROR(CheckWritable(options.html));
   std::error_code ignored;
   if (fs::exists(options.html, ignored) && !options.overwrite) {
@@ -77,8 +81,7 @@ absl::Status Export(const ExportOptions& options) {
                password.empty() ? "not encrypted" : "encrypted", options.html);
   absl::PrintF(
       "not a medical device; the file shows an identifiable face: treat it like a photograph of "
-      "the "
-      "patient\n");
+      "the patient\n");
   return absl::OkStatus();
 }
 

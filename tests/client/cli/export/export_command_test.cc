@@ -85,6 +85,7 @@ TEST_F(ExportCommandTest, WhatCannotBeMadeSaysWhyAndLeavesNothing) {
   Write("short", "abc");
   EXPECT_THAT(Export({"--password-file", "short"}), FailsWith(1, HasSubstr("at least 8")));
   EXPECT_THAT(Run({"export", "none.json", "--html", "t.html"}), FailsWith(1, HasSubstr("none")));
+  EXPECT_THAT(Run({"export", "plan.json", "--html", "t.txt"}), FailsWith(1, HasSubstr(".html")));
   EXPECT_THAT(Run({"export", "plan.json"}), FailsWith(2, HasSubstr("--html")));
   fs::remove(Path("short"));
   EXPECT_THAT(Files(), IsEmpty());
