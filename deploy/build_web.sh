@@ -52,22 +52,19 @@ if ! is_newer "$generated/made" proto/tissueform/v1 deploy/build_web.sh "$web/pa
   touch "$generated/made"
 fi
 
-if ! is_newer "$generated/multiply_columns.ts" "$generated/made" "$web/wasm/multiply_columns.cc"; then
-  # wasm-ld is in Debian's lld.
-  if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null; then
+# The evaluator of prepared answers, for browsers.
+evaluator=core/mechanics/answer_evaluator
+if ! is_newer "$generated/answer_evaluator.wasm" "$generated/made" "$web/wasm" "$evaluator"; then
+  # wasm-ld is in Debian's lld, the standard library in libc++-14-dev-wasm32 and wasi-libc.
+  if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null || [[ ! -e /usr/lib/wasm32-wasi/libc++.a ]]; then
     deploy/install_packages.sh build web
   fi
-  module=$(mktemp)
-  clang++ --target=wasm32 -msimd128 -O3 -std=c++20 -ffreestanding -fno-exceptions -fno-rtti -nostdlib -Wall -Wextra -Werror \
-    -Wl,--no-entry -Wl,--import-memory -Wl,--strip-all -o "$module" "$web/wasm/multiply_columns.cc"
-  {
-    echo "// Made by deploy/build_web.sh of client/web/wasm/multiply_columns.cc."
-    echo "export const MULTIPLY_COLUMNS = \"$(base64 -w0 "$module")\";"
-  } >"$generated/multiply_columns.ts"
-  rm -f "$module"
+  clang++ --target=wasm32-wasi -mexec-model=reactor -msimd128 -O2 -std=c++20 -stdlib=libc++ -fno-exceptions -fno-rtti \
+    -ffunction-sections -fdata-sections -Wall -Wextra -Werror -I. -Wl,--gc-sections,--strip-all,--stack-first,-z,stack-size=262144 \
+    -o "$generated/answer_evaluator.wasm" "$web/wasm/answer_evaluator.cc" "$evaluator"/*.cc
 fi
 
-if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "$web/wasm" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
+if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "$evaluator" "$web/wasm" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
   exit 0
 fi
 (cd "$web" && npm run --silent build)

@@ -20,6 +20,8 @@ const bundle = await build({
     write: false,
     target: "es2022",
     cssCodeSplit: false,
+    // The evaluator, too: the page is one file.
+    assetsInlineLimit: Number.MAX_SAFE_INTEGER,
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 1200,
     rollupOptions: { input: path("src/movingfile/main.ts"), output: { format: "iife", inlineDynamicImports: true } },

@@ -16,6 +16,6 @@ export default defineConfig({
   },
   test: {
     include: ["tests/**/*.test.ts"],
-    setupFiles: ["tests/testing/web_crypto.ts"],
+    setupFiles: ["tests/testing/web_crypto.ts", "tests/testing/files.ts"],
   },
 });

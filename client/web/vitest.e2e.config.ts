@@ -15,6 +15,7 @@ export default defineConfig(({ mode }) => ({
   server: { fs: { strict: false } },
   test: {
     globals: true,
+    setupFiles: [path("tests/testing/files.ts")],
     include: mode === "test" ? ["**/*.test.ts"] : [`${mode}.ts`],
     testTimeout: 120_000,
     hookTimeout: 90_000,

@@ -73,8 +73,8 @@ async function chooseOwnAnswers(name: string) {
   await bench.chooseModel(model);
   const isReady = () => bench.localState.value.kind === "ready" && bench.local.configuration.model === model;
   while (!isReady()) await new Promise((done) => setTimeout(done, 20));
-  const { place, kernel } = bench.localState.value;
-  return { place, kernel, columnBytes: bench.local.columns.bytes.length, handles: bench.plan.handles.length, vertices: bench.file.followed.length };
+  const { place } = bench.localState.value;
+  return { place, columnBytes: bench.local.columns.bytes.length, handles: bench.plan.handles.length, vertices: bench.file.followed.length };
 }
 
 /** Runs in the page: a drag at 60 poses a second with drawing off; times are of the page. */

@@ -29,6 +29,7 @@ TEXT = re.compile(r"(\.md$|^docs/|^LICENSE$)")
 PRODUCT = re.compile(r"^(core|proto|server|client)/(?!lab/)")
 THREADS = re.compile(r"^(server|proto|client/(cpp|gateway|pacs_bridge))/")
 INPUTS = re.compile(r"^(core/(base|mesh|imaging|planning)|client/cli|tests/fuzz)/")
+IN_THE_PAGE = "core/mechanics/answer_evaluator/"  # deploy/build_web.sh compiles it to WebAssembly
 
 
 class Entry:
@@ -119,6 +120,8 @@ def select(entries, changed, reach, links, reads_docs):
     rules = {}
     for path in changed or ():
         rules.setdefault(rule_of(path), set()).add(path)
+        if path.startswith(IN_THE_PAGE):
+            rules.setdefault("web", set()).add(path)
     if changed is None or "everything" in rules:
         return list(entries)
     sources = {path for path in reach(rules.get("source", set())) if path.endswith(".cc")}

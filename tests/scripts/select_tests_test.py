@@ -64,6 +64,9 @@ class Select(unittest.TestCase):
     def test_the_planner_leaves_core_alone(self):
         self.assertEqual(selected("client/web/src/main.ts"), [COMMAND, WEB, BROWSER, STYLE])
 
+    def test_the_page_has_the_evaluator_of_core(self):
+        self.assertEqual(selected("core/mechanics/answer_evaluator/answer_bytes.cc"), [COMMAND, WEB, BROWSER, CHAOS, STYLE, LINKS])
+
     def test_a_text_selects_those_that_read_texts(self):
         self.assertEqual(selected("docs/operations.md"), [COMMAND, STYLE])
         self.assertEqual(selected("README.md"), [COMMAND, STYLE])

@@ -126,7 +126,7 @@ AnswerReading ReadAnswers(std::string_view bytes, size_t most_bytes) {
   }
   Head head;
   if (bytes.size() < sizeof(head) || !bytes.starts_with(kMagic)) {
-    return Failed(AnswerError::kNotAnswers, "the bytes do not begin as prepared answers do");
+    return Failed(AnswerError::kNotAnswers, "these are not prepared answers");
   }
   std::memcpy(&head, bytes.data(), sizeof(head));
   if (head.version < 1 || head.version > kAnswerFormatVersion) {
@@ -137,7 +137,7 @@ AnswerReading ReadAnswers(std::string_view bytes, size_t most_bytes) {
   std::map<uint32_t, Entry> table;
   if (!ReadTable(bytes, head.num_sections, &table)) {
     return Failed(AnswerError::kBroken,
-                  "prepared answers are cut off or damaged; fetch them again");
+                  "prepared answers are incomplete or damaged; fetch them again");
   }
   AnswerReading reading;
   bool fits = true;

@@ -29,8 +29,10 @@ bool AnswerEvaluator::Covers(std::span<const AnswerPose> poses) const {
 
 bool AnswerEvaluator::Answer(std::span<const AnswerPose> poses, std::vector<float>* positions,
                              double* error_mm) const {
+  if (error_mm != nullptr) *error_mm = std::numeric_limits<double>::infinity();
   if (!AreLegal(answers_, poses)) return false;
   const Product product = ProductOf(poses);
+  if (error_mm != nullptr) *error_mm = product.error_mm;
   if (!AreCovered(answers_, poses, product.error_mm)) return false;
   std::vector<float> moves(3 * sizes_.free, 0.0F);
   if (sizes_.pairs > 0) {
@@ -39,7 +41,6 @@ bool AnswerEvaluator::Answer(std::span<const AnswerPose> poses, std::vector<floa
     MoveFree(product.factors, &moves);
   }
   Place(poses, moves, positions);
-  if (error_mm != nullptr) *error_mm = product.error_mm;
   return true;
 }
 

@@ -32,8 +32,8 @@ class AnswerEvaluator {
   // Whether the poses are in the prepared range and the error is within what was asked for.
   bool Covers(std::span<const AnswerPose> poses) const;
 
-  // Writes x y z in mm of every vertex in single precision; resized. False, with nothing written,
-  // where the poses are not covered. `error_mm` may be null.
+  // Writes x y z in mm of every vertex in single precision; resized. False, with no position
+  // written, where the poses are not covered. `error_mm` may be null; otherwise ErrorMm is written.
   bool Answer(std::span<const AnswerPose> poses, std::vector<float>* positions,
               double* error_mm = nullptr) const;
 

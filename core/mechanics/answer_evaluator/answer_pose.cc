@@ -16,7 +16,8 @@ std::array<double, 9> TurnMinusIdentity(const std::array<double, 3>& rotation_ve
                                    rotation_vector[2] / angle};
   const double sine = scale * std::sin(angle);
   // Of 1 - cos(angle), without the digits that the difference would lose.
-  const double versine = scale * 2 * std::pow(std::sin(angle / 2), 2);
+  const double half = std::sin(angle / 2);
+  const double versine = scale * 2 * half * half;
   const std::array<double, 9> cross = {0, -k[2], k[1], k[2], 0, -k[0], -k[1], k[0], 0};
   for (size_t i = 0; i < 3; ++i) {
     for (size_t j = 0; j < 3; ++j) {

@@ -3,39 +3,63 @@
 
 #include "core/mechanics/answer_evaluator/packed_product.h"
 
+#include <algorithm>
+#include <vector>
+
 namespace tissueform {
 namespace {
 
+// Rows that are summed at a time: their sums stay in the first-level cache, whatever the length of
+// the columns.
+constexpr size_t kRowsAtOnce = 1024;
 constexpr int32_t kUpper = 1 << 16;  // steps in one of the upper half
 
-// One column whose entries `entry` tells. Widths of their own, so that compilers unroll.
+// One column whose entries `entry` gives, added to a plane of sums for each factor: compilers
+// vectorize what lies one behind the other.
 template <size_t kWidth, typename Sum, typename Entry>
-void AddColumn(size_t rows, const Sum* factors, const Entry& entry, Sum* sums) {
+void AddColumn(size_t rows, const Sum* factors, const Entry& entry,
+               Sum (&planes)[kWidth][kRowsAtOnce]) {
   for (size_t row = 0; row < rows; ++row) {
     const auto value = static_cast<Sum>(entry(row));
-    for (size_t f = 0; f < kWidth; ++f) sums[kWidth * row + f] += value * factors[f];
+    for (size_t f = 0; f < kWidth; ++f) planes[f][row] += value * factors[f];
+  }
+}
+
+// Rows `first` to `first` + `rows` of all columns; `scaled` holds each column's factors times its
+// step.
+template <size_t kWidth, typename Sum>
+void AddRows(const PackedPart& part, const Sum* scaled, size_t first, size_t rows, Sum* sums) {
+  Sum planes[kWidth][kRowsAtOnce] = {};
+  const size_t only_upper = part.columns - part.full;
+  for (size_t c = 0; c < part.columns; ++c) {
+    const int16_t* const upper = part.upper + c * part.rows + first;
+    const Sum* const factors = scaled + kWidth * c;
+    if (c < only_upper) {
+      const auto entry = [=](size_t row) { return int32_t{upper[row]} * kUpper; };
+      AddColumn<kWidth>(rows, factors, entry, planes);
+    } else {
+      // As a double, which vectorizes: bytes from outside may hold what is no 32-bit number
+      // together.
+      const int16_t* const lower = part.lower + (c - only_upper) * part.rows + first;
+      const auto entry = [=](size_t row) {
+        return double{upper[row] * double{kUpper}} + lower[row];
+      };
+      AddColumn<kWidth>(rows, factors, entry, planes);
+    }
+  }
+  for (size_t row = 0; row < rows; ++row) {
+    for (size_t f = 0; f < kWidth; ++f) sums[kWidth * (first + row) + f] += planes[f][row];
   }
 }
 
 template <size_t kWidth, typename Sum>
 void AddProduct(const PackedPart& part, const double* factors, Sum* sums) {
-  const size_t only_upper = part.columns - part.full;
-  for (size_t c = 0; c < part.columns; ++c) {
-    Sum scaled[kWidth];
-    for (size_t f = 0; f < kWidth; ++f) {
-      scaled[f] = static_cast<Sum>(factors[kWidth * c + f] * part.steps[c]);
-    }
-    const int16_t* const upper = part.upper + c * part.rows;
-    if (c < only_upper) {
-      AddColumn<kWidth>(
-          part.rows, scaled, [=](size_t row) { return int32_t{upper[row]} * kUpper; }, sums);
-    } else {
-      // In 64 bits: bytes from outside may hold what is no 32-bit number together.
-      const int16_t* const lower = part.lower + (c - only_upper) * part.rows;
-      AddColumn<kWidth>(
-          part.rows, scaled, [=](size_t row) { return int64_t{upper[row]} * kUpper + lower[row]; },
-          sums);
-    }
+  std::vector<Sum> scaled(kWidth * part.columns);
+  for (size_t i = 0; i < scaled.size(); ++i) {
+    scaled[i] = static_cast<Sum>(factors[i] * part.steps[i / kWidth]);
+  }
+  for (size_t first = 0; first < part.rows; first += kRowsAtOnce) {
+    AddRows<kWidth>(part, scaled.data(), first, std::min(kRowsAtOnce, part.rows - first), sums);
   }
 }
 

@@ -73,7 +73,10 @@ double RatioOf(const PortableAnswers& answers, const std::vector<double>& pairs,
 // The root of the sum of the squares of what single products do.
 double SingleMm(const std::vector<double>& gains, const std::vector<double>& products) {
   double square = 0;
-  for (size_t p = 0; p < products.size(); ++p) square += std::pow(gains[p] * products[p], 2);
+  for (size_t p = 0; p < products.size(); ++p) {
+    const double single = gains[p] * products[p];
+    square += single * single;
+  }
   return std::sqrt(square);
 }
 
@@ -92,9 +95,8 @@ double EstimateMm(const PortableAnswers& answers, const std::vector<double>& pro
     }
     farthest = std::fmax(farthest, std::sqrt(square));
   }
-  const double single = SingleMm(answers.second_gains, products);
-  return answers.numbers.estimate_scale * std::pow(farthest * single, 0.75) /
-         std::sqrt(answers.numbers.size_mm);
+  const double root = std::sqrt(farthest * SingleMm(answers.second_gains, products));
+  return answers.numbers.estimate_scale * root * std::sqrt(root / answers.numbers.size_mm);
 }
 
 // For all pairs a <= b, those of two different ones twice.

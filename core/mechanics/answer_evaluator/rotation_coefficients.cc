@@ -34,7 +34,8 @@ Blended BlendPoses(std::span<const AnswerPose> poses, const double* u) {
 
 // Of turning by vectors in a ball of radius r, after polynomials of degree n.
 double RemainderOf(double r, int n) {
-  const double taylor = std::exp((n + 1) * std::log(r) - std::lgamma(n + 2));
+  double taylor = 1;
+  for (int k = 1; k <= n + 1; ++k) taylor *= r / k;
   return std::min(1.0, std::ldexp(kLebesgueAllowance, -n)) * taylor;
 }
 

@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { AnswersError } from "./answer_bytes";
-import type { AnswerEvaluator, Evaluation } from "./answer_evaluator";
+import { AnswerEvaluator, type Evaluation, EvaluationError } from "./answer_evaluator";
 import type { FromWorker, ToWorker } from "./evaluation_service";
-import { makeEvaluator } from "./evaluator";
+import { evaluatorModule } from "./evaluator_module";
 
 /**
  * An evaluation in the page itself is shown in the same picture as the pose; from a worker it comes a picture later. So long, in
@@ -25,7 +24,6 @@ export interface EvaluationHost {
   readonly place: "page" | "worker";
   /** False: the browser runs none, and the page does what is slow, too. */
   readonly hasWorkers: boolean;
-  readonly kernel: string;
   /** In the page it is answered before this returns. */
   ask(poses: readonly Pose[], number: number): void;
   /** Of every vertex, mm, an array of the caller's; null where the columns know no band. Tells nothing to who listens for answers. */
@@ -45,18 +43,19 @@ export function evaluationWorker(): WorkerLike | null {
   }
 }
 
-/** Checks and unpacks the bytes beside the page where it can. Rejects with an AnswersError for bytes that are not good. */
+/** Checks the bytes beside the page where it can. Rejects with an EvaluationError for bytes that are not good, and without WebAssembly. */
 export async function makeHost(bytes: Uint8Array, sha256: string, listener: HostListener, makeWorker: () => WorkerLike | null = evaluationWorker): Promise<EvaluationHost> {
+  const module = await evaluatorModule();
   const worker = makeWorker();
-  const ready = worker === null ? null : await load(worker, bytes, sha256);
-  if (worker === null || ready === null) return new PageHost(await makeEvaluator(bytes, { sha256 }), listener, false);
-  if (ready.medianMs > PAGE_BUDGET_MS) return new WorkerHost(worker, ready.kernel, listener);
+  const ready = worker === null ? null : await load(worker, { kind: "load", bytes, sha256, module });
+  if (worker === null || ready === null) return new PageHost(await AnswerEvaluator.open(bytes, module, sha256), listener, false);
+  if (ready.medianMs > PAGE_BUDGET_MS) return new WorkerHost(worker, listener);
   worker.terminate();
-  return new PageHost(await makeEvaluator(bytes), listener, true);
+  return new PageHost(await AnswerEvaluator.open(bytes, module), listener, true);
 }
 
 /** Null where the worker does not run at all. */
-function load(worker: WorkerLike, bytes: Uint8Array, sha256: string): Promise<{ medianMs: number; kernel: string } | null> {
+function load(worker: WorkerLike, message: ToWorker): Promise<{ medianMs: number } | null> {
   return new Promise((resolve, reject) => {
     worker.onerror = () => {
       worker.terminate();
@@ -66,9 +65,9 @@ function load(worker: WorkerLike, bytes: Uint8Array, sha256: string): Promise<{ 
       if (data.kind === "ready") resolve(data);
       if (data.kind !== "failed") return;
       worker.terminate();
-      reject(new AnswersError(data.message));
+      reject(new EvaluationError(data.message));
     };
-    worker.postMessage({ kind: "load", bytes, sha256 });
+    worker.postMessage(message);
   });
 }
 
@@ -80,10 +79,6 @@ class PageHost implements EvaluationHost {
     private readonly listener: HostListener,
     readonly hasWorkers: boolean,
   ) {}
-
-  get kernel(): string {
-    return this.evaluator.kernel.name;
-  }
 
   ask(poses: readonly Pose[], number: number): void {
     this.listener.onEvaluation(this.evaluator.evaluate(poses), number);
@@ -108,7 +103,6 @@ class WorkerHost implements EvaluationHost {
 
   constructor(
     private readonly worker: WorkerLike,
-    readonly kernel: string,
     private readonly listener: HostListener,
   ) {
     worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);

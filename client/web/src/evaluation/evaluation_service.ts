@@ -2,15 +2,14 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import type { AnswerEvaluator } from "./answer_evaluator";
-import { makeEvaluator } from "./evaluator";
+import { AnswerEvaluator } from "./answer_evaluator";
 
 // What page and worker say to each other. A worker is loaded once, and answers one question at a time, in their order.
 
-export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string } | { kind: "evaluate"; poses: Pose[] } | { kind: "band"; poses: Pose[] };
+export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string; module: WebAssembly.Module } | { kind: "evaluate"; poses: Pose[] } | { kind: "band"; poses: Pose[] };
 
 export type FromWorker =
-  | { kind: "ready"; medianMs: number; kernel: string }
+  | { kind: "ready"; medianMs: number }
   | { kind: "failed"; message: string }
   | { kind: "band"; bandMm: Float32Array | null }
   | { kind: "evaluated"; positions: Float32Array; coverage: "covered" | "beyond"; errorBoundMm: number; isEstimate: boolean; uncertainty: Float32Array | null };
@@ -23,7 +22,7 @@ export class EvaluationService {
 
   async take(message: ToWorker): Promise<void> {
     try {
-      if (message.kind === "load") await this.load(message.bytes, message.sha256);
+      if (message.kind === "load") await this.load(message);
       else if (message.kind === "band") this.post({ kind: "band", bandMm: this.evaluator?.bandAt(message.poses) ?? null }, []);
       else this.evaluate(message.poses);
     } catch (thrown) {
@@ -31,10 +30,9 @@ export class EvaluationService {
     }
   }
 
-  private async load(bytes: Uint8Array, sha256: string): Promise<void> {
-    this.evaluator = await makeEvaluator(bytes, { sha256 });
-    const medianMs = this.evaluator.measure(() => performance.now());
-    this.post({ kind: "ready", medianMs, kernel: this.evaluator.kernel.name }, []);
+  private async load({ bytes, sha256, module }: ToWorker & { kind: "load" }): Promise<void> {
+    this.evaluator = await AnswerEvaluator.open(bytes, module, sha256);
+    this.post({ kind: "ready", medianMs: this.evaluator.measure(() => performance.now()) }, []);
   }
 
   private evaluate(poses: Pose[]): void {

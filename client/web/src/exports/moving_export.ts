@@ -3,7 +3,8 @@
 
 import type { CaseFile } from "../case/case_file";
 import type { HandleEntry } from "../case/manifest";
-import { makeEvaluator } from "../evaluation/evaluator";
+import { AnswerEvaluator } from "../evaluation/answer_evaluator";
+import { evaluatorModule } from "../evaluation/evaluator_module";
 import type { Pose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import { type MovingData, writeMovingData } from "../movingdata/moving_data";
@@ -49,7 +50,7 @@ function poseEntry(pose: Pose | undefined, handle: HandleEntry): HandleEntry["po
 /** Whether the file will show its own plan, and not for ever the last picture before it. */
 async function showsPlan(data: MovingData): Promise<boolean> {
   const poses = posesOfCase({ manifest: data });
-  const evaluator = await makeEvaluator(data.answers);
+  const evaluator = await AnswerEvaluator.open(data.answers, await evaluatorModule());
   return evaluator.evaluate(data.handles.flatMap(({ name }) => poses.get(name) ?? []), false).coverage === "covered";
 }
 
@@ -61,7 +62,7 @@ export async function movingFile(file: CaseFile, plan: MovingPlan, password: str
   const data = movingDataOf(file, plan);
   if (!(await showsPlan(data))) {
     const other = plan.model === "linear_elastic" ? "Gradient field" : "Linear elastic";
-    throw new Error(`the plan moves bone beyond the range of the prepared answers of this model reach, so the file could not show it: choose ${other}, or smaller moves`);
+    throw new Error(`the plan moves bone beyond the range of this model's prepared answers, so the file could not show it: choose ${other}, or smaller moves`);
   }
   const reply = await fetch(new URL(TEMPLATE_FILE, document.baseURI));
   if (!reply.ok) throw new Error(`the gateway does not have the page of moving files (${TEMPLATE_FILE}): build the planner again with deploy/build_web.sh`);

@@ -13,7 +13,7 @@ import { type FetchedColumns, fetchColumns } from "./column_fetch";
 export type LocalState =
   | { kind: "none" }
   | { kind: "fetching"; share: number }
-  | { kind: "ready"; place: "page" | "worker"; hasWorkers: boolean; kernel: string; coverage: Evaluation["coverage"] }
+  | { kind: "ready"; place: "page" | "worker"; hasWorkers: boolean; coverage: Evaluation["coverage"] }
   | { kind: "stopped" }
   | { kind: "failed"; text: string };
 
@@ -149,8 +149,8 @@ export class LocalAnswers {
 
   private tell(coverage: Evaluation["coverage"]): void {
     if (this.host === null) return;
-    const { place, hasWorkers, kernel } = this.host;
-    this.listener.onState({ kind: "ready", place, hasWorkers, kernel, coverage });
+    const { place, hasWorkers } = this.host;
+    this.listener.onState({ kind: "ready", place, hasWorkers, coverage });
   }
 }
 

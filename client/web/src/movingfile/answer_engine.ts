@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { makeEvaluator } from "../evaluation/evaluator";
+import { AnswerEvaluator } from "../evaluation/answer_evaluator";
 import type { Pose } from "../geometry/pose";
 
 /** Where the vertices are that surfaces follow. */
@@ -18,15 +18,13 @@ export interface Answer {
 export interface OpenAnswers {
   /** One pose for each handle; null where the answers do not reach. */
   evaluate(poses: Pose[]): Answer | null;
-  /** By the browser's vectors, not by JavaScript alone. */
-  isFast: boolean;
 }
 
-export async function openAnswers(bytes: Uint8Array<ArrayBuffer>): Promise<OpenAnswers> {
-  const evaluator = await makeEvaluator(bytes);
+export async function openAnswers(bytes: Uint8Array<ArrayBuffer>, module: WebAssembly.Module): Promise<OpenAnswers> {
+  const evaluator = await AnswerEvaluator.open(bytes, module);
   const evaluate = (poses: Pose[]) => {
     const { coverage, ...answer } = evaluator.evaluate(poses);
     return coverage === "beyond" ? null : answer;
   };
-  return { evaluate, isFast: evaluator.kernel.name === "webassembly" };
+  return { evaluate };
 }

@@ -7,16 +7,16 @@ import { type Answer, type OpenAnswers, openAnswers } from "./answer_engine";
 // Runs as a classic worker, from text that lies in the page: a file that was opened from disk may have no other.
 
 /** What the page says: the answers first, then poses. Of each the worker answers with one Reply. */
-export type Request = { bytes: Uint8Array<ArrayBuffer> } | { poses: Pose[] };
-export type Reply = { isFast: boolean } | { answer: Answer | null } | { problem: string };
+export type Request = { bytes: Uint8Array<ArrayBuffer>; module: WebAssembly.Module } | { poses: Pose[] };
+export type Reply = { isOpen: true } | { answer: Answer | null } | { problem: string };
 
 let open: OpenAnswers | null = null;
 
 async function reply(request: Request): Promise<Reply> {
   try {
     if ("poses" in request) return { answer: open?.evaluate(request.poses) ?? null };
-    open = await openAnswers(request.bytes);
-    return { isFast: open.isFast };
+    open = await openAnswers(request.bytes, request.module);
+    return { isOpen: true };
   } catch (thrown) {
     return { problem: String(thrown) };
   }

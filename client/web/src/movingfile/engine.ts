@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { evaluatorModule } from "../evaluation/evaluator_module";
 import type { Pose } from "../geometry/pose";
 import { type Answer, openAnswers } from "./answer_engine";
 import AnswersWorker from "./answers_worker?worker&inline";
@@ -12,20 +13,19 @@ export interface Engine {
   ask(poses: Pose[]): Promise<Answer | null>;
   /** Beside the page, so that it never waits. */
   isInWorker: boolean;
-  /** By WebAssembly. */
-  isFast: boolean;
 }
 
 /** What of a worker is used; tests have their own. */
 export type WorkerLike = Pick<Worker, "onmessage" | "onerror" | "terminate"> & { postMessage(request: Request): void };
 
-/** `bytes` stay the caller's. In the page itself where the browser has no workers. */
+/** `bytes` stay the caller's. In the page itself where the browser has no workers. Rejects with a NoEvaluatorError without WebAssembly. */
 export async function startEngine(bytes: Uint8Array<ArrayBuffer>, makeWorker: () => WorkerLike = answersWorker): Promise<Engine> {
+  const module = await evaluatorModule();
   try {
-    return await startWorker(bytes, makeWorker());
+    return await startWorker({ bytes, module }, makeWorker());
   } catch {
-    const { evaluate, isFast } = await openAnswers(bytes);
-    return { ask: async (poses) => evaluate(poses), isInWorker: false, isFast };
+    const { evaluate } = await openAnswers(bytes, module);
+    return { ask: async (poses) => evaluate(poses), isInWorker: false };
   }
 }
 
@@ -34,7 +34,7 @@ function answersWorker(): WorkerLike {
   return new AnswersWorker();
 }
 
-async function startWorker(bytes: Uint8Array<ArrayBuffer>, worker: WorkerLike): Promise<Engine> {
+async function startWorker(opening: Request, worker: WorkerLike): Promise<Engine> {
   const waiting: { accept: (reply: Reply) => void; reject: (error: Error) => void }[] = [];
   let hasEnded = false;
   const ended = () => new Error("the worker has ended");
@@ -53,10 +53,10 @@ async function startWorker(bytes: Uint8Array<ArrayBuffer>, worker: WorkerLike): 
       waiting.push({ accept, reject });
       worker.postMessage(request);
     });
-  const opened = await send({ bytes });
+  await send(opening);
   const ask = async (poses: Pose[]) => {
     const reply = await send({ poses });
     return "answer" in reply ? reply.answer : null;
   };
-  return { ask, isInWorker: true, isFast: "isFast" in opened && opened.isFast };
+  return { ask, isInWorker: true };
 }

@@ -7,6 +7,7 @@ import "../styles/panel.css";
 import "../styles/moving.css";
 import { DamagedError, type Envelope, type Sealed, WrongPasswordError, checkWhole, fromBase64, unseal } from "../movingdata/sealed_payload";
 import { readMovingData } from "../movingdata/moving_data";
+import { NoEvaluatorError } from "../evaluation/evaluator_module";
 import { el } from "../panels/dom";
 import { startEngine } from "./engine";
 import type { MovingHead } from "./moving_head";
@@ -15,6 +16,7 @@ import { movingPage } from "./moving_page";
 // The script of a file that moves. It stands before the data in the page, so that it can say when they are cut off.
 
 const DAMAGED = "This file is damaged or incomplete. Ask its sender for a new copy.";
+const NO_EVALUATOR = "This browser cannot calculate in this file: it needs WebAssembly, which this browser is too old for or has switched off (Lockdown Mode). Open the file in a current Firefox, Chromium, Chrome, Edge or Safari.";
 const TOO_OLD = "This browser is too old for this file: open it in a current Firefox, Chromium, Chrome, Edge or Safari.";
 
 /** For tests: the head. Nothing of the page asks it. */
@@ -30,8 +32,12 @@ async function start(): Promise<void> {
     else askPassword(sealed);
   } catch (thrown) {
     console.error(thrown);
-    say(DAMAGED);
+    say(problemOf(thrown));
   }
+}
+
+function problemOf(thrown: unknown): string {
+  return thrown instanceof NoEvaluatorError ? NO_EVALUATOR : DAMAGED;
 }
 
 function readDocument(): Sealed {
@@ -70,7 +76,7 @@ function askPassword(sealed: Sealed): void {
     open(sealed, input.value)
       .catch((thrown) => {
         const isWrong = thrown instanceof WrongPasswordError;
-        problem.textContent = isWrong ? "This is not the password of this file." : DAMAGED;
+        problem.textContent = isWrong ? "This is not the password of this file." : problemOf(thrown);
         if (!isWrong) console.error(thrown);
         input.select();
       })

@@ -75,10 +75,6 @@ export class MovingHead {
     return this.engine.isInWorker;
   }
 
-  get isFast(): boolean {
-    return this.engine.isFast;
-  }
-
   /** The picture is that of the newest poses. */
   get isIdle(): boolean {
     return this.newest.isIdle;

@@ -101,8 +101,7 @@ function numbersPanel(data: MovingData, head: MovingHead): { element: HTMLElemen
   const problem = el("p", { class: "warning", attributes: { role: "status" } });
   const largest = el("p");
   const exactness = el("p", { class: "quiet" });
-  const lacks = [head.isInWorker ? "" : "no background thread", head.isFast ? "" : "no WebAssembly"].filter((lack) => lack !== "");
-  const slow = lacks.length === 0 ? null : el("p", { class: "quiet", text: `This browser gives the file ${lacks.join(" and ")}: it moves more slowly.` });
+  const slow = head.isInWorker ? null : el("p", { class: "quiet", text: "This browser gives the file no background thread: it moves more slowly." });
   const element = section("Prediction", [
     problem,
     largest,

@@ -77,8 +77,7 @@ export function describeLocal(state: LocalState): string {
       return `The server answers. This page cannot: ${state.text}`;
     case "ready": {
       if (state.coverage === "beyond") return "Outside the prepared range: the server answers.";
-      const lacks = [state.kernel === "webassembly" ? "" : "without WebAssembly", state.hasWorkers ? "" : "without a background thread"].filter((text) => text !== "");
-      const slow = lacks.length === 0 ? "" : ` (${lacks.join(", ")}: slower)`;
+      const slow = state.hasWorkers ? "" : " (without a background thread: slower)";
       return `This page answers at once${slow}; the server confirms.`;
     }
   }

@@ -3,6 +3,8 @@
 
 import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
+import { AnswerEvaluator } from "../../src/evaluation/answer_evaluator";
+import { evaluatorModule } from "../../src/evaluation/evaluator_module";
 import type { Pose } from "../../src/geometry/pose";
 
 const FOLDER = fileURLToPath(new URL("../../../../tests/data/prepared_answers/", import.meta.url));
@@ -21,6 +23,12 @@ export interface GoldenCase {
 export function goldenBytes(name: string): Uint8Array {
   return Uint8Array.from(readFileSync(`${FOLDER}${name}.bin`));
 }
+
+export async function openBytes(bytes: Uint8Array, sha256?: string): Promise<AnswerEvaluator> {
+  return AnswerEvaluator.open(bytes, await evaluatorModule(), sha256);
+}
+
+export const openGolden = (name: string) => openBytes(goldenBytes(name));
 
 export function goldenCases(name: string): GoldenCase[] {
   const { cases } = JSON.parse(readFileSync(`${FOLDER}${name}.json`, "utf8")) as { cases: any[] };

@@ -1,8 +1,9 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { afterEach, expect, test, vi } from "vitest";
+import { afterEach, beforeAll, expect, test, vi } from "vitest";
 import { openCase } from "../../src/case/case_file";
+import { evaluatorModule } from "../../src/evaluation/evaluator_module";
 import { movingDataOf, movingFile } from "../../src/exports/moving_export";
 import { readMovingData, writeMovingData } from "../../src/movingdata/moving_data";
 import { goldenBytes, goldenCases } from "../evaluation/golden_answers";
@@ -11,6 +12,9 @@ import { smallCase, sourceOf } from "../testing/small_case";
 const answers = new Uint8Array([1, 2, 3]);
 const file = () => openCase(sourceOf(smallCase()));
 const plan = { poses: new Map(), model: "linear_elastic", answers };
+
+// It is fetched once per page, and some tests here allow no fetch.
+beforeAll(() => evaluatorModule());
 
 afterEach(() => vi.unstubAllGlobals());
 

@@ -19,7 +19,7 @@ class FakeWorker implements WorkerLike {
   readonly asked: number[] = [];
 
   postMessage(request: Request): void {
-    if ("bytes" in request) queueMicrotask(() => this.tell({ isFast: true }));
+    if ("bytes" in request) queueMicrotask(() => this.tell({ isOpen: true }));
     else this.asked.push(request.poses[0].translationMm[0]);
   }
 
@@ -48,7 +48,7 @@ function follow(engine: Engine) {
 async function started() {
   const worker = new FakeWorker();
   const engine = await startEngine(new Uint8Array(), () => worker);
-  expect([engine.isInWorker, engine.isFast]).toEqual([true, true]);
+  expect(engine.isInWorker).toBe(true);
   return { worker, ...follow(engine) };
 }
 

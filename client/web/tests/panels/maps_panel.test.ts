@@ -6,13 +6,11 @@ import type { LocalState } from "../../src/live/local_answers";
 import { describeLocal, largestText, modelText } from "../../src/panels/maps_panel";
 
 type Ready = Extract<LocalState, { kind: "ready" }>;
-const READY: Ready = { kind: "ready", place: "page", hasWorkers: true, kernel: "webassembly", coverage: "covered" };
+const READY: Ready = { kind: "ready", place: "page", hasWorkers: true, coverage: "covered" };
 
 test.each<[string, Partial<Ready>, string]>([
   ["nothing lacks", {}, "This page answers at once; the server confirms."],
-  ["no WebAssembly", { kernel: "javascript" }, "This page answers at once (without WebAssembly: slower); the server confirms."],
   ["no workers", { hasWorkers: false }, "This page answers at once (without a background thread: slower); the server confirms."],
-  ["neither", { hasWorkers: false, kernel: "javascript" }, "This page answers at once (without WebAssembly, without a background thread: slower); the server confirms."],
   ["beyond the columns", { coverage: "beyond" }, "Outside the prepared range: the server answers."],
 ])("who answers the hand: %s", (_, change, text) => {
   expect(describeLocal({ ...READY, ...change })).toBe(text);

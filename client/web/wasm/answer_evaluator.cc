@@ -1,0 +1,93 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mechanics/answer_evaluator/answer_evaluator.h"
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/mechanics/answer_evaluator/answer_bytes.h"
+
+// The evaluator for browsers, of one list of prepared answers per instance of the module:
+// deploy/build_web.sh compiles it, and client/web/src/evaluation/answer_evaluator.ts calls it.
+// Arrays stay where they are until the next call that writes them.
+namespace tissueform {
+namespace {
+
+struct Instance {
+  std::string bytes;
+  std::string message;
+  std::optional<AnswerEvaluator> evaluator;
+  std::vector<AnswerPose> poses;
+  std::vector<float> positions;
+  std::vector<float> band_mm;
+  double error_mm = 0;
+};
+
+Instance& Self() {
+  static Instance instance;
+  return instance;
+}
+
+}  // namespace
+}  // namespace tissueform
+
+#define EXPORT(name) extern "C" __attribute__((export_name(#name)))
+
+// Where that many bytes of prepared answers are to be written before `open`.
+EXPORT(reserve) char* Reserve(size_t size) {
+  auto& self = tissueform::Self();
+  self.bytes.resize(size);
+  return self.bytes.data();
+}
+
+// Reads the bytes, which are then given up. Returns whether they may be evaluated; otherwise
+// `message` says why not.
+EXPORT(open) bool Open() {
+  auto& self = tissueform::Self();
+  tissueform::AnswerReading reading = tissueform::ReadAnswers(self.bytes);
+  self.bytes = {};
+  self.message = std::move(reading.message);
+  if (reading.error != tissueform::AnswerError::kNone) return false;
+  self.poses.resize(static_cast<size_t>(reading.answers.numbers.num_handles));
+  self.evaluator.emplace(std::move(reading.answers));
+  return true;
+}
+
+// Ends with a zero.
+EXPORT(message) const char* Message() { return tissueform::Self().message.c_str(); }
+
+EXPORT(num_handles) size_t NumHandles() { return tissueform::Self().poses.size(); }
+EXPORT(num_vertices) size_t NumVertices() {
+  return tissueform::Self().evaluator->answers().regions.size();
+}
+EXPORT(is_estimate) bool IsEstimate() {
+  return tissueform::IsModel(tissueform::Self().evaluator->answers(),
+                             tissueform::AnswerModel::kNeoHookean);
+}
+EXPORT(has_band) bool HasBand() { return tissueform::Self().evaluator->has_band(); }
+
+// Of each handle ten numbers: rotation vector, pivot, translation, scale.
+EXPORT(poses) double* Poses() {
+  static_assert(sizeof(tissueform::AnswerPose) == 10 * sizeof(double));
+  return tissueform::Self().poses.data()->rotation_vector.data();
+}
+
+// Whether the poses are covered; then `positions` are written. Writes `error_mm` always.
+EXPORT(evaluate) bool Evaluate() {
+  auto& self = tissueform::Self();
+  return self.evaluator->Answer(self.poses, &self.positions, &self.error_mm);
+}
+EXPORT(error_mm) double ErrorMm() { return tissueform::Self().error_mm; }
+EXPORT(positions) const float* Positions() { return tissueform::Self().positions.data(); }
+
+// Whether the poses have a band; then it is written.
+EXPORT(evaluate_band) bool EvaluateBand() {
+  auto& self = tissueform::Self();
+  return self.evaluator->Band(self.poses, &self.band_mm);
+}
+EXPORT(band_mm) const float* BandMm() { return tissueform::Self().band_mm.data(); }
