@@ -53,18 +53,19 @@ if ! is_newer "$generated/made" proto/tissueform/v1 deploy/build_web.sh "$web/pa
 fi
 
 # The evaluator of prepared answers, for browsers.
-evaluator=core/mechanics/answer_evaluator
-if ! is_newer "$generated/answer_evaluator.wasm" "$generated/made" "$web/wasm" "$evaluator"; then
+evaluator=(core/mechanics/answer_evaluator/*.cc core/base/instruction_set.cc)
+evaluator_sources=("$web/wasm" core/mechanics/answer_evaluator core/base/instruction_set.h core/base/instruction_set.cc)
+if ! is_newer "$generated/answer_evaluator.wasm" "$generated/made" "${evaluator_sources[@]}"; then
   # wasm-ld is in Debian's lld, the standard library in libc++-14-dev-wasm32 and wasi-libc.
   if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null || [[ ! -e /usr/lib/wasm32-wasi/libc++.a ]]; then
     deploy/install_packages.sh build web
   fi
   clang++ --target=wasm32-wasi -mexec-model=reactor -msimd128 -O2 -std=c++20 -stdlib=libc++ -fno-exceptions -fno-rtti \
     -ffunction-sections -fdata-sections -Wall -Wextra -Werror -I. -Wl,--gc-sections,--strip-all,--stack-first,-z,stack-size=262144 \
-    -o "$generated/answer_evaluator.wasm" "$web/wasm/answer_evaluator.cc" "$evaluator"/*.cc
+    -o "$generated/answer_evaluator.wasm" "$web/wasm/answer_evaluator.cc" "${evaluator[@]}"
 fi
 
-if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "$evaluator" "$web/wasm" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
+if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "${evaluator_sources[@]}" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
   exit 0
 fi
 (cd "$web" && npm run --silent build)

@@ -16,7 +16,7 @@ std::atomic<InstructionSet>& Active() {
 
 }  // namespace
 
-absl::string_view InstructionSetName(InstructionSet set) {
+const char* InstructionSetName(InstructionSet set) {
   if (set == InstructionSet::kAvx512) return "avx512";
   return set == InstructionSet::kAvx2 ? "avx2" : "baseline";
 }

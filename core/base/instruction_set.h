@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "absl/strings/string_view.h"
-
 // Hot loops are compiled once for each of these instruction sets, from one body that is inlined
 // into three functions:
 //
@@ -39,7 +37,7 @@ constexpr int RegisterBytes(InstructionSet set) {
 }
 
 // "baseline", "avx2" or "avx512".
-absl::string_view InstructionSetName(InstructionSet set);
+const char* InstructionSetName(InstructionSet set);
 std::vector<std::string> InstructionSetNames(const std::vector<InstructionSet>& sets);
 
 // Those that this processor has, the widest first. The last one is always kBaseline.

@@ -29,7 +29,7 @@ TEXT = re.compile(r"(\.md$|^docs/|^LICENSE$)")
 PRODUCT = re.compile(r"^(core|proto|server|client)/(?!lab/)")
 THREADS = re.compile(r"^(server|proto|client/(cpp|gateway|pacs_bridge))/")
 INPUTS = re.compile(r"^(core/(base|mesh|imaging|planning)|client/cli|tests/fuzz)/")
-IN_THE_PAGE = "core/mechanics/answer_evaluator/"  # deploy/build_web.sh compiles it to WebAssembly
+IN_THE_PAGE = ("core/mechanics/answer_evaluator/", "core/base/instruction_set.")  # deploy/build_web.sh compiles it to WebAssembly
 
 
 class Entry:

@@ -8,8 +8,9 @@
 #include <cstddef>
 
 #include "core/mechanics/answer_evaluator/answer_sizes.h"
-#include "core/mechanics/answer_evaluator/packed_product.h"
+#include "core/mechanics/answer_evaluator/packed_matrix.h"
 #include "core/mechanics/answer_evaluator/pose_factors.h"
+#include "core/mechanics/answer_evaluator/small_product.h"
 
 namespace tissueform {
 namespace {
@@ -35,12 +36,9 @@ std::vector<double> MappedFactors(const PortableAnswers& answers,
                                   std::span<const AnswerPose> poses) {
   std::vector<double> factors;
   AddElasticFactors(answers, poses, &factors);
-  std::vector<double> mapped(answers.band.steps.size(), 0);
-  for (size_t c = 0; c < mapped.size(); ++c) {
-    for (size_t j = 0; j < factors.size(); ++j) {
-      mapped[c] += answers.band_map[c * factors.size() + j] * factors[j];
-    }
-  }
+  std::vector<double> mapped(answers.band.steps.size());
+  MultiplySmall(answers.band_map.data(), factors.data(), {mapped.size(), factors.size(), 1},
+                mapped.data());
   return mapped;
 }
 
@@ -51,10 +49,10 @@ std::vector<float> BandOfFree(const PortableAnswers& answers, std::span<const An
   const std::vector<double> mapped = MappedFactors(answers, poses);
   const size_t rows = 3 * sizes.free;
   const PackedColumns& band = answers.band;
-  std::vector<float> fields(rows * sizes.band_variables, 0.0F);
-  AddPackedProduct(
-      {band.steps.data(), band.upper.data(), nullptr, fields.size(), band.steps.size(), 0},
-      mapped.data(), 1, fields.data());
+  std::vector<float> fields(rows * sizes.band_variables);
+  const PackedMatrix columns(PackedPart{band.steps.data(), band.upper.data(), nullptr,
+                                        fields.size(), band.steps.size(), 0});
+  columns.Multiply(mapped.data(), 1, {.first = 0, .first_full = columns.columns()}, fields.data());
   std::vector<float> result(sizes.free);
   for (size_t v = 0; v < sizes.free; ++v) {
     double covariance[3][3] = {};

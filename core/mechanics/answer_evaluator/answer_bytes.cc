@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/mechanics/answer_evaluator/answer_checks.h"
+#include "core/mechanics/answer_evaluator/answer_sizes.h"
 
 namespace tissueform {
 namespace {
@@ -64,6 +65,39 @@ uint32_t VersionOf(const PortableAnswers& answers) {
   return answers.third_lengths.empty() ? 1 : kAnswerFormatVersion;
 }
 
+// Matrices travel row by row. Of one its columns; 0 of what is none, or travels column by column.
+size_t MatrixColumns(const AnswerSizes& sizes, uint32_t section) {
+  switch (section) {
+    case 13:
+      return sizes.nodes;
+    case 20:
+    case 22:
+      return sizes.factors;
+    case 42:
+    case 43:
+      return sizes.pairs;
+    case 44:
+      return sizes.triples;
+    case 60:
+      return 12 * sizes.handles;
+    default:
+      return 0;
+  }
+}
+
+// Of `lines` that lie one behind the other what lies across them.
+template <typename Value>
+std::vector<Value> Transposed(const std::vector<Value>& values, size_t lines) {
+  std::vector<Value> across;
+  across.reserve(values.size());
+  for (size_t i = 0; i < values.size() / lines; ++i) {
+    for (size_t line = 0; line < lines; ++line) {
+      across.push_back(values[line * (values.size() / lines) + i]);
+    }
+  }
+  return across;
+}
+
 AnswerReading Failed(AnswerError error, std::string message) {
   return {.error = error, .message = std::move(message), .answers = {}};
 }
@@ -90,31 +124,31 @@ bool ReadTable(std::string_view bytes, uint32_t num_sections, std::map<uint32_t,
 
 std::string WriteAnswers(const PortableAnswers& answers) {
   std::vector<Entry> entries;
-  std::vector<const void*> contents;
-  const auto add = [&](uint32_t number, const auto& values) {
+  size_t num_sections = 1;
+  VisitSections(answers, [&](uint32_t /*number*/, const auto& values) {
+    num_sections += values.empty() ? 0 : 1;
+  });
+  std::string bytes(sizeof(Head) + num_sections * sizeof(Entry), '\0');
+  const auto append = [&](uint32_t number, const auto& values) {
     using Value = typename std::remove_cvref_t<decltype(values)>::value_type;
     if (values.empty()) return;
-    entries.push_back({number, TypeOf<Value>(), 0, static_cast<uint32_t>(values.size())});
-    contents.push_back(values.data());
+    const size_t offset = Aligned(bytes.size());
+    entries.push_back({number, TypeOf<Value>(), static_cast<uint32_t>(offset),
+                       static_cast<uint32_t>(values.size())});
+    bytes.resize(offset + values.size() * sizeof(Value));
+    std::memcpy(bytes.data() + offset, values.data(), values.size() * sizeof(Value));
   };
-  const auto numbers = std::bit_cast<NumberList>(answers.numbers);
-  add(kNumbersSection, numbers);
-  VisitSections(answers, add);
-
-  size_t end = sizeof(Head) + entries.size() * sizeof(Entry);
-  for (Entry& entry : entries) {
-    entry.offset = static_cast<uint32_t>(Aligned(end));
-    end = entry.offset + entry.count * BytesOf(entry.type);
-  }
-  std::string bytes(Aligned(end), '\0');
-  Head head = {{}, VersionOf(answers), static_cast<uint32_t>(entries.size())};
+  const AnswerSizes sizes = SizesOf(answers);
+  append(kNumbersSection, std::bit_cast<NumberList>(answers.numbers));
+  VisitSections(answers, [&](uint32_t number, const auto& values) {
+    const size_t columns = MatrixColumns(sizes, number);
+    columns > 0 ? append(number, Transposed(values, columns)) : append(number, values);
+  });
+  bytes.resize(Aligned(bytes.size()));
+  Head head = {{}, VersionOf(answers), static_cast<uint32_t>(num_sections)};
   std::memcpy(head.magic, kMagic, kMagicBytes);
   std::memcpy(bytes.data(), &head, sizeof(head));
   std::memcpy(bytes.data() + sizeof(Head), entries.data(), entries.size() * sizeof(Entry));
-  for (size_t i = 0; i < entries.size(); ++i) {
-    std::memcpy(bytes.data() + entries[i].offset, contents[i],
-                entries[i].count * BytesOf(entries[i].type));
-  }
   return bytes;
 }
 
@@ -171,6 +205,11 @@ AnswerReading ReadAnswers(std::string_view bytes, size_t most_bytes) {
   if (std::string wrong = CheckAnswers(reading.answers); !wrong.empty()) {
     return Failed(AnswerError::kInconsistent, std::move(wrong));
   }
+  const AnswerSizes sizes = SizesOf(reading.answers);
+  VisitSections(reading.answers, [&sizes](uint32_t number, auto& values) {
+    const size_t columns = MatrixColumns(sizes, number);
+    if (columns > 0 && !values.empty()) values = Transposed(values, values.size() / columns);
+  });
   return reading;
 }
 

@@ -8,22 +8,32 @@
 
 #include "core/mechanics/answer_evaluator/answer_pose.h"
 #include "core/mechanics/answer_evaluator/answer_sizes.h"
-#include "core/mechanics/answer_evaluator/held_vertices.h"
+#include "core/mechanics/answer_evaluator/free_vertices.h"
+#include "core/mechanics/answer_evaluator/packed_matrix.h"
 #include "core/mechanics/answer_evaluator/portable_answers.h"
+#include "core/mechanics/answer_evaluator/vertex_places.h"
 
 namespace tissueform {
 
-// Prepared answers without what made them: the same positions as VertexResponse gives, by the
-// standard library alone. Reads all of the columns where a server reads as much as its tolerance
-// needs, so the two differ by less than their errors together.
+// Prepared answers at work, by the standard library alone: everywhere they are evaluated by this,
+// on servers (VertexResponse) with another `Matrix`, which keeps entries as its processor likes
+// them and reads as much of them as the tolerance needs. Two that read differently differ by less
+// than their errors together.
 //
 // Constant: any number of threads may ask at once.
-class AnswerEvaluator {
+template <typename Matrix>
+class BasicAnswerEvaluator {
  public:
   // REQUIRES: CheckAnswers finds nothing; so it is with what ReadAnswers gives.
-  explicit AnswerEvaluator(PortableAnswers answers);
+  explicit BasicAnswerEvaluator(PortableAnswers answers);
+  // Matrices may be views of the answers, which stay where they are when they are moved.
+  BasicAnswerEvaluator(BasicAnswerEvaluator&&) noexcept = default;
+  BasicAnswerEvaluator& operator=(BasicAnswerEvaluator&&) noexcept = default;
 
+  // Without the entries of columns where `Matrix` keeps them.
   const PortableAnswers& answers() const { return answers_; }
+  const AnswerSizes& sizes() const { return sizes_; }
+  const FreeVertices<Matrix>& free_vertices() const { return free_; }
 
   // The error of the positions in mm: a bound, or of neo_hookean an estimate. Infinite unless there
   // is a pose for every handle, with a positive scale and numbers up to 1e6 (rad, scale) or 1e9 mm.
@@ -32,10 +42,16 @@ class AnswerEvaluator {
   // Whether the poses are in the prepared range and the error is within what was asked for.
   bool Covers(std::span<const AnswerPose> poses) const;
 
-  // Writes x y z in mm of every vertex in single precision; resized. False, with no position
-  // written, where the poses are not covered. `error_mm` may be null; otherwise ErrorMm is written.
+  // Writes x y z in mm of every vertex in single precision, 3 numbers each. False, with no
+  // position written, where the poses are not covered. `error_mm` may be null; otherwise ErrorMm is
+  // written.
+  bool Answer(std::span<const AnswerPose> poses, float* positions, double* error_mm) const;
+  // The same; resized.
   bool Answer(std::span<const AnswerPose> poses, std::vector<float>* positions,
               double* error_mm = nullptr) const;
+
+  // The same of poses that need not be covered. REQUIRES: legal poses (AreLegal).
+  void Evaluate(std::span<const AnswerPose> poses, float* positions) const;
 
   // Whether there are columns of the band of uncertainty.
   bool has_band() const { return sizes_.band_variables > 0; }
@@ -46,22 +62,29 @@ class AnswerEvaluator {
   // (HasBand).
   bool Band(std::span<const AnswerPose> poses, std::vector<float>* band_mm) const;
 
+  size_t bytes_held() const;
+
  private:
   // Of a pose of every handle.
   struct Product {
     std::vector<double> factors;  // of the compressed columns
+    ColumnReading reading;
     double error_mm = 0;
   };
 
+  // Of poses that may be anything: an infinite error unless they are legal.
+  Product CheckedProductOf(std::span<const AnswerPose> poses) const;
+  // REQUIRES: legal poses.
   Product ProductOf(std::span<const AnswerPose> poses) const;
-  void MoveFree(const std::vector<double>& mapped, std::vector<float>* moves) const;
-  void MoveClusters(const std::vector<double>& mapped, std::vector<float>* moves) const;
-  void Place(std::span<const AnswerPose> poses, const std::vector<float>& moves,
-             std::vector<float>* positions) const;
+  void Write(std::span<const AnswerPose> poses, const Product& product, float* positions) const;
 
   PortableAnswers answers_;
   AnswerSizes sizes_;
-  HeldVertices held_;
+  VertexPlaces places_;
+  FreeVertices<Matrix> free_;
 };
+
+// Of the bytes as they come, for clients and browsers.
+using AnswerEvaluator = BasicAnswerEvaluator<PackedMatrix>;
 
 }  // namespace tissueform

@@ -61,10 +61,11 @@ struct PortableAnswers {
   std::vector<float> fixed_rest;
   std::vector<double> handle_rest;
 
-  // How poses become factors of columns. Matrices are row-major.
+  // How poses become factors of columns. Matrices are column-major, as products with them are
+  // fastest; bytes hold them row by row.
   std::vector<double> origins;        // of gradient_field a point each handle, otherwise one
   std::vector<double> centroids;      // of neo_hookean: the middle of every handle
-  std::vector<double> nodes;          // of gradient_field: harmonic values, a row each
+  std::vector<double> nodes;          // of gradient_field: harmonic values, a node's side by side
   std::vector<double> interpolation;  // from values at the nodes to coefficients
   std::vector<double> simplex_low;
   std::vector<double> guard_gains;

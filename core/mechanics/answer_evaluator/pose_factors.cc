@@ -3,12 +3,11 @@
 
 #include "core/mechanics/answer_evaluator/pose_factors.h"
 
-#include <array>
-#include <cmath>
 #include <cstddef>
 
 #include "core/mechanics/answer_evaluator/answer_sizes.h"
 #include "core/mechanics/answer_evaluator/rotation_coefficients.h"
+#include "core/mechanics/answer_evaluator/series_terms.h"
 
 namespace tissueform {
 namespace {
@@ -37,108 +36,16 @@ PoseFactors GradientFactors(const PortableAnswers& answers, std::span<const Answ
   return result;
 }
 
-// Of every handle the sine of its turn times the axis, and how its middle moves.
-std::vector<double> NumbersOf(const PortableAnswers& answers, std::span<const AnswerPose> poses) {
-  std::vector<double> numbers;
-  for (size_t h = 0; h < poses.size(); ++h) {
-    const std::array<double, 9> R = TurnMinusIdentity(poses[h].rotation_vector, 1);
-    numbers.push_back(0.5 * (R[7] - R[5]));
-    numbers.push_back(0.5 * (R[2] - R[6]));
-    numbers.push_back(0.5 * (R[3] - R[1]));
-    const std::array<double, 3> move =
-        MotionAbout(poses[h], answers.centroids.data() + 3 * h).move_mm;
-    numbers.insert(numbers.end(), move.begin(), move.end());
-  }
-  return numbers;
-}
-
-// The length of what a matrix of that many columns gives of the products.
-double LengthOf(const std::vector<float>& rows, const std::vector<double>& products) {
-  double square = 0;
-  for (size_t first = 0; first < rows.size(); first += products.size()) {
-    double sum = 0;
-    for (size_t p = 0; p < products.size(); ++p) sum += double{rows[first + p]} * products[p];
-    square += sum * sum;
-  }
-  return std::sqrt(square);
-}
-
-// How long the third order is beside the second.
-double RatioOf(const PortableAnswers& answers, const std::vector<double>& pairs,
-               const std::vector<double>& triples) {
-  const double second = LengthOf(answers.second_lengths, pairs);
-  return second > 0 ? LengthOf(answers.third_lengths, triples) / second : 0;
-}
-
-// The root of the sum of the squares of what single products do.
-double SingleMm(const std::vector<double>& gains, const std::vector<double>& products) {
-  double square = 0;
-  for (size_t p = 0; p < products.size(); ++p) {
-    const double single = gains[p] * products[p];
-    square += single * single;
-  }
-  return std::sqrt(square);
-}
-
-// Of second order: c (|u2| s2)^(3/4) / L^(1/2).
-double EstimateMm(const PortableAnswers& answers, const std::vector<double>& products) {
-  const size_t pairs = products.size();
-  double farthest = 0;
-  for (size_t first = 0; first < answers.probes.size(); first += 3 * pairs) {
-    double square = 0;
-    for (size_t row = 0; row < 3; ++row) {
-      double sum = 0;
-      for (size_t p = 0; p < pairs; ++p) {
-        sum += double{answers.probes[first + row * pairs + p]} * products[p];
-      }
-      square += sum * sum;
-    }
-    farthest = std::fmax(farthest, std::sqrt(square));
-  }
-  const double root = std::sqrt(farthest * SingleMm(answers.second_gains, products));
-  return answers.numbers.estimate_scale * root * std::sqrt(root / answers.numbers.size_mm);
-}
-
-// For all pairs a <= b, those of two different ones twice.
-std::vector<double> PairProductsOf(const std::vector<double>& numbers) {
-  std::vector<double> products;
-  for (size_t a = 0; a < numbers.size(); ++a) {
-    for (size_t b = a; b < numbers.size(); ++b) {
-      products.push_back((a == b ? 1 : 2) * numbers[a] * numbers[b]);
-    }
-  }
-  return products;
-}
-
-// For all a <= b <= c, as often as there are orders of the three.
-std::vector<double> TripleProductsOf(const std::vector<double>& numbers) {
-  std::vector<double> products;
-  for (size_t a = 0; a < numbers.size(); ++a) {
-    for (size_t b = a; b < numbers.size(); ++b) {
-      for (size_t c = b; c < numbers.size(); ++c) {
-        const double orders = a == c ? 1 : a == b || b == c ? 3 : 6;
-        products.push_back(orders * numbers[a] * numbers[b] * numbers[c]);
-      }
-    }
-  }
-  return products;
-}
-
 PoseFactors NeoHookeanFactors(const PortableAnswers& answers, std::span<const AnswerPose> poses) {
   PoseFactors result;
   AddElasticFactors(answers, poses, &result.factors);
-  const std::vector<double> numbers = NumbersOf(answers, poses);
-  const std::vector<double> pairs = PairProductsOf(numbers);
-  result.factors.insert(result.factors.end(), pairs.begin(), pairs.end());
-  double series_mm = EstimateMm(answers, pairs);
-  if (!answers.third_lengths.empty()) {
-    const std::vector<double> triples = TripleProductsOf(numbers);
-    const double ratio = RatioOf(answers, pairs, triples);
-    for (const double product : triples) result.factors.push_back(product / (1 + ratio));
-    series_mm = std::fmax(series_mm, SingleMm(answers.third_gains, triples)) * ratio / (1 + ratio);
+  const SeriesTerms terms = TermsOf(answers, NumbersOf(answers, poses));
+  result.factors.insert(result.factors.end(), terms.pairs.begin(), terms.pairs.end());
+  for (const double product : terms.triples) {
+    result.factors.push_back(product / (1 + terms.ratio));
   }
-  result.model_error_mm = series_mm + answers.numbers.rounding_mm +
-                          answers.numbers.cut_per_mm * SingleMm(answers.first_gains, numbers);
+  result.model_error_mm = SeriesErrorMm(answers, terms) + answers.numbers.rounding_mm +
+                          answers.numbers.cut_per_mm * FirstOrderMm(answers, terms.numbers);
   return result;
 }
 

@@ -8,11 +8,15 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/mechanics/answer_evaluator/small_product.h"
+
 namespace tissueform {
 namespace {
 
-// Those of ResponseBasis and of RotationExpansion.
+// Responses fall with the degree; this allows for those of the second guard degree, which are not
+// measured, not doing so.
 constexpr double kGainAllowance = 1.5;
+// For interpolating instead of approximating best.
 constexpr double kLebesgueAllowance = 16;
 
 // Rotation vector and scale, blended along harmonic values.
@@ -39,7 +43,10 @@ double RemainderOf(double r, int n) {
   return std::min(1.0, std::ldexp(kLebesgueAllowance, -n)) * taylor;
 }
 
-double RemainderBound(const PortableAnswers& answers, std::span<const AnswerPose> poses) {
+}  // namespace
+
+double RemainderBound(const PortableAnswers& answers, std::span<const AnswerPose> poses,
+                      int degree) {
   std::vector<double> u = answers.simplex_low;
   std::vector<Blended> corners = {BlendPoses(poses, u.data())};
   for (size_t h = 0; h < poses.size(); ++h) {
@@ -47,6 +54,8 @@ double RemainderBound(const PortableAnswers& answers, std::span<const AnswerPose
     corners.push_back(BlendPoses(poses, u.data()));
     u[h] = answers.simplex_low[h];
   }
+  // Mixed rotation vectors fill the polytope of the corners, and the furthest two points of that
+  // are two corners.
   double diameter = 0;
   double smallest = corners.front().scale;
   double largest = smallest;
@@ -59,15 +68,12 @@ double RemainderBound(const PortableAnswers& answers, std::span<const AnswerPose
     smallest = std::min(smallest, a.scale);
     largest = std::max(largest, a.scale);
   }
-  if (diameter == 0) return 0;
+  if (diameter == 0) return 0;  // the scale alone is linear in u
   const auto k = static_cast<double>(poses.size());
-  const auto degree = static_cast<int>(answers.numbers.degree);
   const double radius = diameter * std::sqrt(k / (2 * k + 2));
   return 0.5 * (largest + smallest) * RemainderOf(radius, degree) +
          0.5 * (largest - smallest) * RemainderOf(radius, degree - 1);
 }
-
-}  // namespace
 
 RotationCoefficients ExpandRotation(const PortableAnswers& answers,
                                     std::span<const AnswerPose> poses) {
@@ -79,17 +85,11 @@ RotationCoefficients ExpandRotation(const PortableAnswers& answers,
     std::copy(turn.begin(), turn.end(), at_nodes.begin() + static_cast<ptrdiff_t>(9 * node));
   }
   RotationCoefficients result;
-  result.coefficients.assign(9 * nodes, 0);
+  result.coefficients.resize(9 * nodes);
+  MultiplySmall(answers.interpolation.data(), at_nodes.data(), {nodes, nodes, 9},
+                result.coefficients.data());
   std::vector<double> sizes(nodes);
-  for (size_t n = 0; n < nodes; ++n) {
-    double* const C = result.coefficients.data() + 9 * n;
-    for (size_t node = 0; node < nodes; ++node) {
-      const double weight = answers.interpolation[n * nodes + node];
-      for (size_t i = 0; i < 9; ++i) C[i] += weight * at_nodes[9 * node + i];
-    }
-    for (size_t i = 0; i < 9; ++i) sizes[n] += C[i] * C[i];
-    sizes[n] = std::sqrt(sizes[n]);
-  }
+  for (size_t n = 0; n < nodes; ++n) sizes[n] = RowNorm(result.coefficients.data() + 9 * n, 9);
   const std::vector<double>& gains = answers.guard_gains;
   if (gains.empty()) return result;
   const auto first = static_cast<size_t>(answers.numbers.num_polynomials);
@@ -98,7 +98,8 @@ RotationCoefficients ExpandRotation(const PortableAnswers& answers,
   for (size_t n = first + gains.size(); n < nodes; ++n) {
     result.truncation_mm += kGainAllowance * largest * sizes[n];
   }
-  result.truncation_mm += answers.numbers.largest_gain_mm * RemainderBound(answers, poses);
+  result.truncation_mm += answers.numbers.largest_gain_mm *
+                          RemainderBound(answers, poses, static_cast<int>(answers.numbers.degree));
   return result;
 }
 

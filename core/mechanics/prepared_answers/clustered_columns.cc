@@ -9,7 +9,12 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/mechanics/answer_evaluator/answer_sizes.h"
+#include "core/mechanics/answer_evaluator/free_vertices.h"
+#include "core/mechanics/answer_evaluator/packed_matrix.h"
 #include "core/mechanics/prepared_answers/column_compression.h"
+#include "core/mechanics/prepared_answers/column_packing.h"
+#include "core/mechanics/prepared_answers/panel_matrix.h"
 
 namespace tissueform {
 namespace {
@@ -82,39 +87,33 @@ Eigen::Index CountNeeded(const Eigen::MatrixXf& columns, const Eigen::MatrixXf& 
   return needed;
 }
 
-}  // namespace
+// Before digits are cut.
+struct TurnedColumns {
+  std::vector<Eigen::MatrixXd> columns;  // of every cluster, 3 rows a vertex
+  Eigen::MatrixXd map;                   // those of all clusters, one below the other
+};
 
-ClusteredColumns::ClusteredColumns(const Positions& rest, const Eigen::MatrixXd& columns,
-                                   const Uses& uses)
-    : rest_(rest.cast<float>()), vertices_(static_cast<size_t>(rest.rows())), map_(0, 0, 0) {
-  std::iota(vertices_.begin(), vertices_.end(), 0);
-  std::vector<Eigen::Index> ends;
-  if (!vertices_.empty()) {
-    Divide(rest, vertices_.begin(), vertices_.end(), vertices_.begin(), &ends);
-  }
-  const Turned turned = Turn(ends, columns, uses);
-  for (const Digits& digits : {Digits{}, Digits{.all_of_map = true}, Digits{true, true}}) {
-    Store(turned, ends, digits);
-    if (HasDigitsEnough(turned, uses)) break;
-  }
-}
+struct Digits {
+  bool all_of_map = false;
+  bool all_of_columns = false;
+};
 
-ClusteredColumns::Turned ClusteredColumns::Turn(const std::vector<Eigen::Index>& ends,
-                                                const Eigen::MatrixXd& columns,
-                                                const Uses& uses) const {
+// `vertices` of the clusters in turn, which end where `ends` says.
+TurnedColumns Turn(const Numbers& vertices, const std::vector<Eigen::Index>& ends,
+                   const Eigen::MatrixXd& columns, const ClusterUses& uses) {
   const Eigen::Index count = columns.cols();
   const Eigen::MatrixXd root =
       UsesRoot({.factors = 1, .typical = uses.typical, .widest = uses.tried});
   const Eigen::MatrixXd undo =
       root.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(count, count));
   const Eigen::MatrixXd tried = undo * uses.tried;
-  Turned turned;
+  TurnedColumns turned;
   std::vector<Eigen::MatrixXd> maps;
   Eigen::Index rows = 0;
   Eigen::Index begin = 0;
   for (const Eigen::Index end : ends) {
     const Eigen::MatrixXd own =
-        RowsOf(columns, vertices_.data() + begin, vertices_.data() + end) * root;
+        RowsOf(columns, vertices.data() + begin, vertices.data() + end) * root;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(own.transpose() * own);
     const Eigen::MatrixXd axes_down = axes.eigenvectors().rowwise().reverse();
     const Eigen::MatrixXd along = own * axes_down;
@@ -134,103 +133,91 @@ ClusteredColumns::Turned ClusteredColumns::Turn(const std::vector<Eigen::Index>&
   return turned;
 }
 
-void ClusteredColumns::Store(const Turned& turned, const std::vector<Eigen::Index>& ends,
-                             const Digits& digits) {
-  const auto store = [](const Eigen::MatrixXd& values, bool all_digits) {
-    QuantizedMatrix panels(values.rows(), values.cols(), all_digits ? values.cols() : 0);
-    for (Eigen::Index c = 0; c < values.cols(); ++c) panels.SetColumn(c, values.col(c));
-    return panels;
-  };
-  map_ = store(turned.map, digits.all_of_map);
-  clusters_.clear();
-  Eigen::Index row = 0;
-  for (size_t k = 0; k < ends.size(); ++k) {
-    clusters_.push_back(
-        {k == 0 ? 0 : ends[k - 1], row, store(turned.columns[k], digits.all_of_columns)});
-    row += turned.columns[k].cols();
+void Pack(const TurnedColumns& turned, const Digits& digits, PortableAnswers* answers) {
+  answers->cluster_map = {};
+  answers->clusters = {};
+  answers->columns = {};
+  PackColumns(turned.map, digits.all_of_map ? turned.map.cols() : 0, &answers->cluster_map);
+  for (const Eigen::MatrixXd& columns : turned.columns) {
+    const Eigen::Index full = digits.all_of_columns ? columns.cols() : 0;
+    for (const Eigen::Index count : {columns.rows() / 3, columns.cols(), full}) {
+      answers->clusters.push_back(static_cast<int32_t>(count));
+    }
+    PackColumns(columns, full, &answers->columns);
   }
 }
 
-bool ClusteredColumns::HasDigitsEnough(const Turned& turned, const Uses& uses) const {
+// Whether digits put no vertex off by more than a part of its room.
+bool HasDigitsEnough(const TurnedColumns& turned, const ClusterUses& uses,
+                     const PortableAnswers& answers) {
   constexpr Eigen::Index kMax = 20;  // what digits do hardly differs from one use to the other
-  FloatPositions answer;
+  const Eigen::Map<const FloatPositions> rest(
+      answers.free_rest.data(), static_cast<Eigen::Index>(answers.free_rest.size()) / 3, 3);
   for (Eigen::Index s = 0; s < std::min(kMax, uses.tried.cols()); ++s) {
-    Evaluate(uses.tried.col(s), &answer);
+    const FloatPositions moves = EvaluateClusters(answers, uses.tried.col(s)) - rest;
     const Eigen::VectorXd coefficients = turned.map * uses.tried.col(s);
-    for (size_t k = 0; k < clusters_.size(); ++k) {
-      const Eigen::MatrixXd& columns = turned.columns[k];
-      const Eigen::VectorXd exact =
-          columns * coefficients.segment(clusters_[k].first_row, columns.cols());
-      const int32_t* const vertices = vertices_.data() + clusters_[k].first_vertex;
-      for (Eigen::Index i = 0; i < exact.size() / 3; ++i) {
-        const Eigen::Vector3f moved =
-            (answer.row(vertices[i]) - rest_.row(vertices[i])).transpose();
-        const double off = (moved.cast<double>() - exact.segment<3>(3 * i)).norm();
-        if (off > kDigitsOfRoom * uses.room_mm[s]) return false;
+    const int32_t* vertex = answers.cluster_vertices.data();
+    Eigen::Index first = 0;
+    for (const Eigen::MatrixXd& columns : turned.columns) {
+      const Eigen::VectorXd exact = columns * coefficients.segment(first, columns.cols());
+      first += columns.cols();
+      for (Eigen::Index i = 0; i < exact.size(); i += 3, ++vertex) {
+        const Eigen::Vector3d moved = moves.row(*vertex).transpose().cast<double>();
+        if ((moved - exact.segment<3>(i)).norm() > kDigitsOfRoom * uses.room_mm[s]) return false;
       }
     }
   }
   return true;
 }
 
-void ClusteredColumns::Evaluate(const Eigen::VectorXd& factors, FloatPositions* positions) const {
-  if (positions->rows() < rest_.rows()) positions->resize(rest_.rows(), 3);
-  Eigen::VectorXf coefficients(map_.rows());
-  const auto all_of = [](const QuantizedMatrix& panels) {
-    return QuantizedMatrix::EvaluationPlan{.first = 0,
-                                           .first_full = panels.cols() - panels.full_cols()};
-  };
-  map_.Multiply(factors, all_of(map_), coefficients.data());
-  FloatPositions moves(std::min<Eigen::Index>(kClusterVertices, rest_.rows()), 3);
-  for (const Cluster& cluster : clusters_) {
-    cluster.columns.Multiply(
-        coefficients.segment(cluster.first_row, cluster.columns.cols()).cast<double>(),
-        all_of(cluster.columns), moves.data());
-    const int32_t* const vertices = vertices_.data() + cluster.first_vertex;
-    for (Eigen::Index i = 0; i < cluster.columns.rows() / 3; ++i) {
-      positions->row(vertices[i]) = rest_.row(vertices[i]) + moves.row(i);
-    }
+}  // namespace
+
+void ClusterColumns(const Positions& rest, const Eigen::MatrixXd& columns, const ClusterUses& uses,
+                    PortableAnswers* answers) {
+  Numbers& vertices = answers->cluster_vertices;
+  vertices.resize(static_cast<size_t>(rest.rows()));
+  std::iota(vertices.begin(), vertices.end(), 0);
+  std::vector<Eigen::Index> ends;
+  if (!vertices.empty()) {
+    Divide(rest, vertices.begin(), vertices.end(), vertices.begin(), &ends);
+  }
+  const TurnedColumns turned = Turn(vertices, ends, columns, uses);
+  for (const Digits& digits : {Digits{}, Digits{.all_of_map = true}, Digits{true, true}}) {
+    Pack(turned, digits, answers);
+    if (HasDigitsEnough(turned, uses, *answers)) break;
   }
 }
 
-void ClusteredColumns::Describe(PortableAnswers* answers) const {
-  answers->free_rest.assign(rest_.data(), rest_.data() + rest_.size());
-  answers->cluster_vertices = vertices_;
-  map_.Describe(&answers->cluster_map);
-  for (const Cluster& cluster : clusters_) {
-    for (const Eigen::Index count :
-         {cluster.columns.rows() / 3, cluster.columns.cols(), cluster.columns.full_cols()}) {
-      answers->clusters.push_back(static_cast<int32_t>(count));
-    }
-    cluster.columns.Describe(&answers->columns);
+FloatPositions EvaluateClusters(const PortableAnswers& answers, const Eigen::VectorXd& factors) {
+  const PackedColumns& map = answers.cluster_map;
+  AnswerSizes sizes;
+  sizes.factors = map.steps.size();
+  sizes.pairs = 1;  // that there are some tells that there are clusters
+  for (size_t k = 1; k < answers.clusters.size(); k += 3) {
+    sizes.columns += static_cast<size_t>(answers.clusters[k]);
   }
+  sizes.full_map_cols = sizes.columns > 0 ? map.lower.size() / sizes.columns : 0;
+  const FreeVertices<PackedMatrix> free(answers, sizes);
+  const std::vector<double> list(factors.begin(), factors.end());
+  FloatPositions positions(static_cast<Eigen::Index>(answers.free_rest.size()) / 3, 3);
+  free.Move(answers, sizes, free.Map(answers, sizes, list), {}, positions.data());
+  return positions;
 }
 
-Eigen::Index ClusteredColumns::num_columns() const {
-  Eigen::Index entries = 0;
-  for (const Cluster& cluster : clusters_)
-    entries += cluster.columns.rows() * cluster.columns.cols();
-  const Eigen::Index rows = std::max<Eigen::Index>(3 * rest_.rows(), 1);
-  return (entries + rows - 1) / rows;
-}
-
-int64_t ClusteredColumns::bytes_held() const {
-  int64_t bytes = map_.bytes_held() + rest_.size() * static_cast<int64_t>(sizeof(float)) +
-                  static_cast<int64_t>(vertices_.size() * sizeof(int32_t));
-  for (const Cluster& cluster : clusters_) bytes += cluster.columns.bytes_held();
-  return bytes;
-}
-
-int64_t ClusteredColumns::BytesNeeded(Eigen::Index num_vertices, Eigen::Index columns) {
+int64_t ClusteredColumnsBytes(Eigen::Index num_vertices, Eigen::Index columns) {
   constexpr int64_t kSquares = 8;
-  const Eigen::Index clusters = (num_vertices + kClusterVertices - 1) / kClusterVertices;
+  const auto clusters =
+      static_cast<size_t>((num_vertices + kClusterVertices - 1) / kClusterVertices);
   const Eigen::Index per_cluster = std::min(columns, 3 * kClusterVertices);
+  const auto width = static_cast<size_t>(columns);
   // Columns and maps before their digits are cut and after, and the columns that they are made of.
-  return (3 * num_vertices * (columns + per_cluster) + clusters * per_cluster * columns * 2 +
+  return (3 * num_vertices * (columns + per_cluster) +
+          static_cast<int64_t>(clusters) * per_cluster * columns * 2 +
           kSquares * columns * columns) *
              static_cast<int64_t>(sizeof(double)) +
-         QuantizedMatrix::BytesNeeded(clusters * per_cluster, columns, columns) +
-         clusters * QuantizedMatrix::BytesNeeded(3 * kClusterVertices, columns, columns) +
+         static_cast<int64_t>(
+             PanelMatrix::BytesNeeded(clusters * static_cast<size_t>(per_cluster), width, width) +
+             clusters * PanelMatrix::BytesNeeded(3 * size_t{kClusterVertices}, width, width)) +
          4 * num_vertices * static_cast<int64_t>(sizeof(float));
 }
 

@@ -20,8 +20,6 @@ constexpr double kUnusedVariance = 1e-8;
 // Of the tolerance: what the tail's coarser bound may take.
 constexpr double kTailOfTolerance = 0.05;
 constexpr double kUnitRoundoff = 5.97e-8;  // of singles
-// Sums of positive singles: what rounding may take from them.
-constexpr double kBoundRounding = 1 + 1e-4;
 
 // How large the factors of every column are, by their root mean square.
 Eigen::VectorXd RowSizes(const Eigen::MatrixXd& uses) {
@@ -132,25 +130,11 @@ ColumnCompression::ColumnCompression(const Eigen::MatrixXd& columns, int rows_pe
   tail_ = tail.cast<float>();
 }
 
-double ColumnCompression::CutBoundMm(const Eigen::MatrixXd& factors) const {
-  const RowMajorMatrix<float> singles = factors.cast<float>();
-  const float of_cut = MultiplySmall(cut_map_, singles).rowwise().norm().sum();
-  const float of_tail = tail_.dot(singles.rowwise().norm());
-  return kBoundRounding * (double{of_cut} + double{of_tail});
-}
-
 void ColumnCompression::Describe(PortableAnswers* answers) const {
-  const RowMajorMatrix<double> map = map_;
-  const RowMajorMatrix<float> cut_map = cut_map_;
-  answers->map.assign(map.data(), map.data() + map.size());
+  answers->map.assign(map_.data(), map_.data() + map_.size());
   answers->gains.assign(gains_.begin(), gains_.end());
-  answers->cut_map.assign(cut_map.data(), cut_map.data() + cut_map.size());
+  answers->cut_map.assign(cut_map_.data(), cut_map_.data() + cut_map_.size());
   answers->tail.assign(tail_.begin(), tail_.end());
-}
-
-int64_t ColumnCompression::bytes_held() const {
-  return (kept_.size() + gains_.size() + map_.size()) * static_cast<int64_t>(sizeof(double)) +
-         (cut_map_.size() + tail_.size()) * static_cast<int64_t>(sizeof(float));
 }
 
 int64_t ColumnCompression::BytesNeeded(Eigen::Index rows, Eigen::Index columns) {

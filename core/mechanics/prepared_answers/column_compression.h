@@ -8,7 +8,6 @@
 #include <Eigen/Core>
 
 #include "core/mechanics/answer_evaluator/portable_answers.h"
-#include "core/mechanics/prepared_answers/small_product.h"
 
 namespace tissueform {
 
@@ -29,7 +28,7 @@ Eigen::MatrixXd UsesRoot(const ColumnWeights& uses);
 //   columns * f = kept * (map * f) + cut * (cut_map * f)   for every f, to rounding,
 // where [kept cut] are the columns turned to their principal axes under the weight of their uses
 // (the covariance of typical f: Cholesky, then the eigenvectors of the weighted Gram matrix). The
-// second term is left out; `CutBoundMm` says what that can put off.
+// second term is left out; CutErrorMm says what that can put off.
 class ColumnCompression {
  public:
   // As few columns as keep the cut part of the widest uses below `tolerance_mm`. `columns`: #rows
@@ -39,22 +38,13 @@ class ColumnCompression {
 
   // #rows by #kept, those that matter least first.
   const Eigen::MatrixXd& kept() const { return kept_; }
-  void ReleaseKept() { kept_.resize(0, 0); }
   // Of every kept one: the largest displacement that it gives a vertex, a unit of its factors.
   const Eigen::VectorXd& gains() const { return gains_; }
-
-  // `factors`: #columns by 1 or 3. Returns #kept by as many.
-  Eigen::MatrixXd Map(const Eigen::MatrixXd& factors) const { return MultiplySmall(map_, factors); }
-
-  // How far a vertex can be put off by what is cut.
-  double CutBoundMm(const Eigen::MatrixXd& factors) const;
 
   // Writes what becomes of factors: map, gains, cut_map and tail.
   void Describe(PortableAnswers* answers) const;
 
-  Eigen::Index num_columns() const { return map_.cols(); }
   Eigen::Index num_kept() const { return map_.rows(); }
-  int64_t bytes_held() const;
   // At most, while it is made and later.
   static int64_t BytesNeeded(Eigen::Index rows, Eigen::Index columns);
 

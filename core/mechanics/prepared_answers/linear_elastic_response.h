@@ -42,8 +42,8 @@ int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::In
 // truncated and there is no sharp range: the bound is that of what the compression cut and of the
 // digits that are kept, and grows with the poses' motion.
 //
-// Factorises the elastic system if no model has done so. bytes_held() are its own
-// columns; it keeps the preparation, which knows the coefficients.
+// Factorises the elastic system if no model has done so. Holds the columns only, not the
+// preparation.
 //
 // Errors: InvalidArgument (a vertex outside [0, #V), no vertex, a tolerance that is not a positive
 // number), those of MeshPreparation::Elastic; what the admission says, before anything is

@@ -5,21 +5,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/answer_evaluator/pose_factors.h"
+#include "core/mechanics/answer_evaluator/series_terms.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/neo_hookean_deformer.h"
 #include "core/mechanics/elasticity/neo_hookean_expansion.h"
 #include "core/mechanics/prepared_answers/chosen_vertices.h"
 #include "core/mechanics/prepared_answers/clustered_columns.h"
 #include "core/mechanics/prepared_answers/neo_hookean_series.h"
-#include "core/mechanics/prepared_answers/pose_numbers.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
-#include "core/mechanics/prepared_answers/series_estimate.h"
+#include "core/mechanics/prepared_answers/series_calibration.h"
 
 namespace tissueform {
 namespace {
@@ -57,113 +57,54 @@ double LargestMove(const Eigen::Ref<const Eigen::VectorXd>& column) {
   return column.size() == 0 ? 0 : column.reshaped(3, column.size() / 3).colwise().norm().maxCoeff();
 }
 
-class NeoHookeanResponse : public VertexResponse {
+// Makes the answers' parts one after the other.
+class NeoHookeanBuilder {
  public:
-  NeoHookeanResponse(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
-                     ChosenVertices chosen, NeoHookeanResponseOptions options)
+  NeoHookeanBuilder(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
+                    NeoHookeanResponseOptions options)
       : preparation_(std::move(preparation)),
         elastic_(elastic),
         options_(std::move(options)),
-        chosen_(std::move(chosen)),
         centroids_(HandleCentroids(*preparation_)),
-        sizes_(*preparation_) {}
-
-  // `free`: those of the chosen vertices.
-  absl::Status Prepare(const std::vector<int32_t>& free, const Cancellation& cancellation) {
-    TF_ASSIGN_OR_RETURN(
-        NeoHookeanSeries series,
-        MakeNeoHookeanSeries(*preparation_, elastic_, free, options_.observer, cancellation));
-    damping_ = std::move(series.damping);
-    estimate_.emplace(series.linear, series.columns.middleCols(sizes_.linear, sizes_.pairs),
-                      series.columns.rightCols(sizes_.triples),
-                      preparation_->mesh().BoundingBoxDiagonal());
-    TF_RETURN_IF_ERROR(Calibrate(free, series.columns, cancellation));
-    TF_RETURN_IF_ERROR(cancellation.Check());
-    Compress(preparation_->mesh().positions()(free, Eigen::all), series.columns);
-    return absl::OkStatus();
-  }
-
-  double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
-    return UseOf(poses).error_mm;
-  }
-  bool error_is_estimate() const override { return true; }
-
-  bool Covers(absl::Span<const HandlePose> poses) const override {
-    return InRange(poses) && ErrorBoundMm(poses) <= options_.max_estimate_mm;
-  }
-
-  void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    Write(poses, UseOf(poses), positions);
-  }
-
-  std::optional<double> Answer(absl::Span<const HandlePose> poses,
-                               FloatPositions* positions) const override {
-    if (!InRange(poses)) return std::nullopt;
-    const Use use = UseOf(poses);
-    if (!(use.error_mm <= options_.max_estimate_mm)) return std::nullopt;
-    Write(poses, use, positions);
-    return use.error_mm;
-  }
-
-  PortableAnswers Describe() const override {
-    PortableAnswers answers;
-    chosen_.Describe(&answers);
-    columns_->Describe(&answers);
-    estimate_->Describe(&answers);
-    if (damping_) damping_->Describe(&answers);
-    AnswerNumbers& numbers = answers.numbers;
+        sizes_(*preparation_) {
+    AnswerNumbers& numbers = answers_.numbers;
     numbers.model = static_cast<double>(AnswerModel::kNeoHookean);
     numbers.tolerance_mm = options_.tolerance_mm;
     numbers.max_rotation_rad = options_.max_rotation_rad;
     numbers.max_estimate_mm = options_.max_estimate_mm;
-    numbers.cut_per_mm = cut_per_mm_;
-    numbers.rounding_mm = rounding_mm_;
-    answers.origins.assign(elastic_.origin().begin(), elastic_.origin().end());
+    answers_.origins.assign(elastic_.origin().begin(), elastic_.origin().end());
     for (const Eigen::Vector3d& centroid : centroids_) {
-      answers.centroids.insert(answers.centroids.end(), centroid.begin(), centroid.end());
+      answers_.centroids.insert(answers_.centroids.end(), centroid.begin(), centroid.end());
     }
-    return answers;
   }
 
-  Eigen::Index num_vertices() const override { return chosen_.size(); }
-  int num_terms() const override { return static_cast<int>(columns_->num_columns()); }
-  int num_terms_before() const override { return static_cast<int>(columns_->num_columns_before()); }
-  int64_t bytes_held() const override {
-    return columns_->bytes_held() + chosen_.bytes_held() + estimate_->bytes_held() +
-           (damping_ ? damping_->bytes_held() : 0);
+  absl::StatusOr<std::unique_ptr<VertexResponse>> Build(const std::vector<int32_t>& vertices,
+                                                        const Cancellation& cancellation) {
+    const Positions& rest = preparation_->mesh().positions();
+    const std::vector<int32_t> free =
+        DescribeVertices(rest, preparation_->constraints(), vertices, &answers_);
+    TF_ASSIGN_OR_RETURN(
+        NeoHookeanSeries series,
+        MakeNeoHookeanSeries(*preparation_, elastic_, free, options_.observer, cancellation));
+    answers_.second_lengths = std::move(series.second_lengths);
+    answers_.third_lengths = std::move(series.third_lengths);
+    DescribeSeries(series.linear, series.columns.middleCols(sizes_.linear, sizes_.pairs),
+                   series.columns.rightCols(sizes_.triples),
+                   preparation_->mesh().BoundingBoxDiagonal(), &answers_);
+    TF_RETURN_IF_ERROR(Calibrate(free, series.columns, cancellation));
+    TF_RETURN_IF_ERROR(cancellation.Check());
+    Compress(rest(free, Eigen::all), series.columns);
+    return std::make_unique<VertexResponse>(std::move(answers_),
+                                            static_cast<int>(sizes_.columns()));
   }
 
  private:
-  // What the columns are multiplied with, and what that leaves out.
-  struct Use {
-    SeriesEstimate::Terms terms;
-    Eigen::VectorXd factors;
-    double series_mm = 0;  // estimated
-    double error_mm = 0;   // with what was cut of the columns, and rounding
-  };
-
-  Use UseOf(absl::Span<const HandlePose> poses) const {
-    const Eigen::VectorXd numbers = PoseNumbers(poses, centroids_);
-    Use use;
-    use.terms.pairs = PairProducts(numbers);
-    use.factors.resize(sizes_.columns());
-    use.factors.head(sizes_.linear + sizes_.pairs) << elastic_.Coefficients(poses), use.terms.pairs;
-    if (damping_) {
-      use.terms.triples = TripleProducts(numbers);
-      use.terms.ratio = damping_->Ratio(use.terms.pairs, use.terms.triples);
-      use.factors.tail(sizes_.triples) = use.terms.triples / (1 + use.terms.ratio);
-    }
-    use.series_mm = estimate_->Mm(use.terms);
-    use.error_mm =
-        std::max(use.series_mm + rounding_mm_ + cut_per_mm_ * estimate_->FirstOrderMm(numbers),
-                 chosen_.RoundingBoundMm(poses));
-    return use;
+  SeriesTerms Terms(const std::vector<HandlePose>& poses) const {
+    return TermsOf(answers_, NumbersOf(answers_, ToAnswerPoses(poses)));
   }
-
-  void Write(absl::Span<const HandlePose> poses, const Use& use, FloatPositions* positions) const {
-    positions->resize(chosen_.size(), 3);
-    columns_->Evaluate(use.factors, positions);
-    chosen_.Complete(poses, positions);
+  // Of what the series leaves out, estimated.
+  double SeriesMm(const std::vector<HandlePose>& poses) const {
+    return SeriesErrorMm(answers_, Terms(poses));
   }
 
   // Turned for typical poses; what is cut and how many digits are kept is judged by others, of
@@ -176,8 +117,8 @@ class NeoHookeanResponse : public VertexResponse {
                     .scale_change = 0,
                     .translation_mm = 0.05 * size_mm,
                     .pivot_offset_mm = 0.05 * size_mm};
-    ClusteredColumns::Uses uses;
-    uses.typical = FactorsOf(CoveredSamples(range, kTypical));
+    ClusterUses uses;
+    uses.typical = FactorsOfAll(CoveredSamples(range, kTypical));
     std::vector<std::vector<HandlePose>> tried =
         CoveredSamples({options_.max_rotation_rad / 3, 0, 0.03 * size_mm, 0.02 * size_mm}, kTried);
     range.translation_mm = 0.15 * size_mm;
@@ -185,13 +126,13 @@ class NeoHookeanResponse : public VertexResponse {
     for (std::vector<HandlePose>& poses : CoveredSamples(range, kTried)) {
       tried.push_back(std::move(poses));
     }
-    uses.tried = FactorsOf(tried);
+    uses.tried = FactorsOfAll(tried);
     uses.room_mm.resize(uses.tried.cols());
     for (size_t s = 0; s < tried.size(); ++s) {
       uses.room_mm[static_cast<Eigen::Index>(s)] =
-          options_.tolerance_mm * (1 + UseOf(tried[s]).series_mm / kEstimateThatDoublesMm);
+          options_.tolerance_mm * (1 + SeriesMm(tried[s]) / kEstimateThatDoublesMm);
     }
-    columns_.emplace(rest, columns, uses);
+    ClusterColumns(rest, columns, uses, &answers_);
     MeasureCut(rest, columns, tried, uses.tried);
   }
 
@@ -204,22 +145,19 @@ class NeoHookeanResponse : public VertexResponse {
     // So many poses read the columns once.
     constexpr Eigen::Index kAtOnce = 20;
     if (rest.rows() == 0) return;
-    rounding_mm_ = kRoundings * rest.rowwise().norm().maxCoeff();
+    answers_.numbers.rounding_mm = kRoundings * rest.rowwise().norm().maxCoeff();
     double worst = 0;
-    FloatPositions answer;
     Eigen::MatrixXd exact;
     for (Eigen::Index s = 0; s < factors.cols(); ++s) {
       if (s % kAtOnce == 0) {
         exact = columns * factors.middleCols(s, std::min(kAtOnce, factors.cols() - s));
       }
-      columns_->Evaluate(factors.col(s), &answer);
-      const Positions off = answer.cast<double>() - rest -
+      const Positions off = EvaluateClusters(answers_, factors.col(s)).cast<double>() - rest -
                             exact.col(s % kAtOnce).reshaped<Eigen::RowMajor>(rest.rows(), 3);
-      const double moved =
-          estimate_->FirstOrderMm(PoseNumbers(tried[static_cast<size_t>(s)], centroids_));
+      const double moved = FirstOrderMm(answers_, Terms(tried[static_cast<size_t>(s)]).numbers);
       if (moved > 0) worst = std::max(worst, off.rowwise().norm().maxCoeff() / moved);
     }
-    cut_per_mm_ = kCutAllowance * worst;
+    answers_.numbers.cut_per_mm = kCutAllowance * worst;
   }
 
   // Those that are not covered are made smaller until they are: nobody asks for the rest.
@@ -227,26 +165,24 @@ class NeoHookeanResponse : public VertexResponse {
     constexpr double kSmaller = 0.8;
     std::vector<std::vector<HandlePose>> samples = SamplePoses(centroids_, range, count);
     for (std::vector<HandlePose>& poses : samples) {
-      while (UseOf(poses).series_mm > options_.max_estimate_mm) {
+      while (SeriesMm(poses) > options_.max_estimate_mm) {
         for (HandlePose& pose : poses) pose = PartOfPose(pose, kSmaller);
       }
     }
     return samples;
   }
 
-  Eigen::MatrixXd FactorsOf(const std::vector<std::vector<HandlePose>>& samples) const {
-    Eigen::MatrixXd factors(sizes_.columns(), static_cast<Eigen::Index>(samples.size()));
-    for (size_t s = 0; s < samples.size(); ++s) {
-      factors.col(static_cast<Eigen::Index>(s)) = UseOf(samples[s]).factors;
-    }
-    return factors;
+  Eigen::VectorXd Factors(const std::vector<HandlePose>& poses) const {
+    const std::vector<double> factors = FactorsOf(answers_, ToAnswerPoses(poses)).factors;
+    return Eigen::Map<const Eigen::VectorXd>(factors.data(), sizes_.columns());
   }
 
-  bool InRange(absl::Span<const HandlePose> poses) const {
-    constexpr double kSlack = 1 + 1e-9;  // the edge of the range belongs to it
-    return std::all_of(poses.begin(), poses.end(), [this](const HandlePose& pose) {
-      return pose.rotation_vector.norm() <= options_.max_rotation_rad * kSlack && pose.scale == 1;
-    });
+  Eigen::MatrixXd FactorsOfAll(const std::vector<std::vector<HandlePose>>& samples) const {
+    Eigen::MatrixXd factors(sizes_.columns(), static_cast<Eigen::Index>(samples.size()));
+    for (size_t s = 0; s < samples.size(); ++s) {
+      factors.col(static_cast<Eigen::Index>(s)) = Factors(samples[s]);
+    }
+    return factors;
   }
 
   // Against what the model converges to. `columns`: of the free vertices.
@@ -261,21 +197,21 @@ class NeoHookeanResponse : public VertexResponse {
     control.on_progress = [&cancellation](const Deformation& /*so_far*/) {
       return cancellation.Check().ok();
     };
-    std::vector<SeriesEstimate::Measured> measured;
+    std::vector<MeasuredSeries> measured;
     for (const std::vector<HandlePose>& poses : CalibrationPoses()) {
       TF_ASSIGN_OR_RETURN(const Deformation converged, deformer->Deform(poses, control));
       TF_RETURN_IF_ERROR(cancellation.Check());
       if (!converged.summary.converged) continue;  // nothing is learnt from it
-      Use use = UseOf(poses);
       const Positions displacements =
           (converged.positions - preparation_->mesh().positions())(free, Eigen::all);
       const double error =
-          LargestMove(columns * use.factors - displacements.reshaped<Eigen::RowMajor>());
-      measured.push_back({std::move(use.terms), error});
+          LargestMove(columns * Factors(poses) - displacements.reshaped<Eigen::RowMajor>());
+      measured.push_back({Terms(poses), error});
     }
-    estimate_->Calibrate(
-        measured, kEstimateAllowance +
-                      kAllowancePerHandle * static_cast<double>(NumHandles(*preparation_) - 1));
+    CalibrateSeries(measured,
+                    kEstimateAllowance +
+                        kAllowancePerHandle * static_cast<double>(NumHandles(*preparation_) - 1),
+                    &answers_);
     return absl::OkStatus();
   }
 
@@ -294,25 +230,19 @@ class NeoHookeanResponse : public VertexResponse {
     return poses;
   }
 
-  // Constant after Prepare.
   const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
   const ElasticSystem& elastic_;
   const NeoHookeanResponseOptions options_;
-  const ChosenVertices chosen_;
   const std::vector<Eigen::Vector3d> centroids_;
   const SeriesSizes sizes_;
-  std::optional<ThirdOrderDamping> damping_;  // where there is a third order
-  std::optional<SeriesEstimate> estimate_;
-  std::optional<ClusteredColumns> columns_;
-  double cut_per_mm_ = 0;  // of the first order
-  double rounding_mm_ = 0;
+  PortableAnswers answers_;
 };
 
 }  // namespace
 
 int64_t NeoHookeanResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices) {
   return NeoHookeanSeriesBytes(preparation) +
-         ClusteredColumns::BytesNeeded(num_vertices, SeriesSizes(preparation).columns());
+         ClusteredColumnsBytes(num_vertices, SeriesSizes(preparation).columns());
 }
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateNeoHookeanResponse(
@@ -326,12 +256,7 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateNeoHookeanResponse(
         NeoHookeanResponseBytes(*preparation, static_cast<Eigen::Index>(vertices.size()))));
   }
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
-  ChosenVertices chosen(preparation->mesh().positions(), preparation->constraints(), vertices);
-  const std::vector<int32_t> free = chosen.FreeAmong(vertices);
-  auto response =
-      std::make_unique<NeoHookeanResponse>(preparation, *elastic, std::move(chosen), options);
-  TF_RETURN_IF_ERROR(response->Prepare(free, cancellation));
-  return response;
+  return NeoHookeanBuilder(preparation, *elastic, options).Build(vertices, cancellation);
 }
 
 }  // namespace tissueform

@@ -36,12 +36,12 @@ int64_t NeoHookeanResponseBytes(const MeshPreparation& preparation, Eigen::Index
 // covered.
 //
 // Unlike those of the linear models its error is an ESTIMATE: what the series leaves out is
-// measured, when it is made, against converged answers to a few poses (see SeriesEstimate), such
+// measured, when it is made, against converged answers to a few poses (see SeriesErrorMm), such
 // that 99 of 100 random poses err less, most of them a quarter to a third. What compression puts
 // off is measured too and counted in.
 //
-// Factorises the elastic system if no model has done so. bytes_held() are its own columns; it keeps
-// the preparation, which knows the coefficients.
+// Factorises the elastic system if no model has done so. Holds the columns only, not the
+// preparation.
 //
 // Errors: InvalidArgument (a vertex outside [0, #V), no vertex, an option that is not a positive
 // number), those of MeshPreparation::Elastic; what the admission says.

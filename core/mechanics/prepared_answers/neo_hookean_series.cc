@@ -6,10 +6,11 @@
 #include <algorithm>
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/answer_evaluator/series_terms.h"
 #include "core/mechanics/elasticity/neo_hookean_expansion.h"
-#include "core/mechanics/prepared_answers/compressed_response.h"
-#include "core/mechanics/prepared_answers/pose_numbers.h"
+#include "core/mechanics/prepared_answers/compressed_columns.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
+#include "core/mechanics/prepared_answers/third_order_lengths.h"
 
 namespace tissueform {
 namespace {
@@ -20,6 +21,14 @@ using Eigen::MatrixXd;
 
 // Columns that are solved for in one pass over the factor.
 constexpr Index kColumnsPerPass = 24;
+constexpr Index kNumbers = kNumbersPerHandle;
+
+// w x v as a matrix that v is multiplied with: what a turn is to first order.
+Matrix3d CrossMatrix(const Eigen::Vector3d& w) {
+  Matrix3d cross;
+  cross << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  return cross;
+}
 
 // Columns of the linear system that v -> A (v - `about`) on a handle is made of.
 void SetAffine(const ElasticSystem& elastic, size_t handle, const Matrix3d& A,
@@ -35,11 +44,11 @@ void SetAffine(const ElasticSystem& elastic, size_t handle, const Matrix3d& A,
 
 // v1 of all vertices, 3 #V by #numbers.
 MatrixXd LinearFields(const ElasticSystem& elastic, const std::vector<Eigen::Vector3d>& centroids) {
-  const Index numbers = kNumbersPerHandle * static_cast<Index>(centroids.size());
+  const Index numbers = kNumbers * static_cast<Index>(centroids.size());
   MatrixXd coefficients = MatrixXd::Zero(elastic.response_columns().cols(), numbers);
   for (size_t h = 0; h < centroids.size(); ++h) {
     for (int axis = 0; axis < 3; ++axis) {
-      const Index number = kNumbersPerHandle * static_cast<Index>(h) + axis;
+      const Index number = kNumbers * static_cast<Index>(h) + axis;
       SetAffine(elastic, h, CrossMatrix(Eigen::Vector3d::Unit(axis)), centroids[h],
                 coefficients.col(number));
       coefficients(ElasticSystem::kColumnsPerHandle * static_cast<Index>(h) + 4 * axis + 3,
@@ -52,10 +61,10 @@ MatrixXd LinearFields(const ElasticSystem& elastic, const std::vector<Eigen::Vec
 // v2 of one handle, of all vertices, 3 #V by pairs of its numbers.
 MatrixXd QuadraticFields(const ElasticSystem& elastic, const Eigen::Vector3d& centroid) {
   MatrixXd coefficients =
-      MatrixXd::Zero(elastic.response_columns().cols(), NumFieldPairs(kNumbersPerHandle));
+      MatrixXd::Zero(elastic.response_columns().cols(), NumFieldPairs(kNumbers));
   Index pair = 0;
-  for (Index a = 0; a < kNumbersPerHandle; ++a) {
-    for (Index b = a; b < kNumbersPerHandle; ++b, ++pair) {
+  for (Index a = 0; a < kNumbers; ++a) {
+    for (Index b = a; b < kNumbers; ++b, ++pair) {
       if (b >= 3) continue;  // moves are what they are
       const Eigen::Vector3d e = Eigen::Vector3d::Unit(a);
       const Eigen::Vector3d f = Eigen::Vector3d::Unit(b);
@@ -96,7 +105,7 @@ absl::StatusOr<MatrixXd> SolveAll(const MeshPreparation& preparation, const Elas
 
 SeriesSizes::SeriesSizes(const MeshPreparation& preparation) {
   const auto handles = static_cast<Index>(preparation.constraints().handles().size());
-  numbers = kNumbersPerHandle * handles;
+  numbers = kNumbers * handles;
   linear = ElasticSystem::kColumnsPerHandle * handles;
   pairs = NumFieldPairs(numbers);
   triples = handles == 1 ? NumFieldTriples(numbers) : 0;
@@ -142,7 +151,8 @@ absl::StatusOr<NeoHookeanSeries> MakeNeoHookeanSeries(const MeshPreparation& pre
                                 linear, second + QuadraticFields(elastic, centroids.front())),
                &passes));
   series.columns.rightCols(sizes.triples) = RowsOfVertices(third, vertices);
-  series.damping.emplace(second, third);
+  series.second_lengths = LengthsOf(second);
+  series.third_lengths = LengthsOf(third);
   return series;
 }
 

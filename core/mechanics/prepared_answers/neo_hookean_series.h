@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -13,24 +12,25 @@
 #include "core/base/cancellation.h"
 #include "core/base/preparation_progress.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
-#include "core/mechanics/prepared_answers/third_order_damping.h"
 
 namespace tissueform {
 
-// The neo-Hookean answer as a series in the poses' numbers n (PoseNumbers), of the second order, or
+// The neo-Hookean answer as a series in the poses' numbers n (SeriesTerms), of the second order, or
 // of the third where there is one handle: three have 1,140 triples of numbers. With u1 the linear
 // answer, which has the handles exactly where the poses put them, v1 and v2 what is linear and
 // quadratic in n of it (A - I = n x + (n n^T - |n|^2 I) / 2 + O(n^4) for a turn), and f = K u +
 // Q(u, u) + ... the forces about rest:
 //   K u2 = -Q(v1, v1),   K u3 = -p(n),   both 0 on all constrained vertices,
 // where p is the third order of the forces along t v1 + t^2 (v2 + u2) (ThirdOrderForces). The
-// answer is u1 + u2 + u3 / (1 + q), see ThirdOrderDamping.
+// answer is u1 + u2 + u3 / (1 + q), see SeriesTerms and LengthsOf.
 struct NeoHookeanSeries {
   // Displacements, mm, of the vertices asked for, 3 v + axis: the columns of the linear system,
   // then those of all pairs and triples, as they are counted in NumFieldPairs and NumFieldTriples.
   Eigen::MatrixXd columns;
-  Eigen::MatrixXd linear;                    // v1 of the same vertices, a unit of every number
-  std::optional<ThirdOrderDamping> damping;  // none where the series ends with the second order
+  Eigen::MatrixXd linear;  // v1 of the same vertices, a unit of every number
+  // LengthsOf both orders over all vertices; empty where the series ends with the second.
+  std::vector<float> second_lengths;
+  std::vector<float> third_lengths;
 };
 
 // How many columns of each order there are for the constraints' handles.

@@ -5,16 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/answer_evaluator/pose_factors.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/harmonic_fields.h"
 #include "core/mechanics/prepared_answers/chosen_vertices.h"
-#include "core/mechanics/prepared_answers/compressed_response.h"
+#include "core/mechanics/prepared_answers/compressed_columns.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
 #include "core/mechanics/prepared_answers/rotation_expansion.h"
 #include "core/mechanics/prepared_answers/term_responses.h"
@@ -32,9 +32,6 @@ constexpr int kColumnsPerHandle = 4;
 constexpr Eigen::Index kVectorsPerTerm = 4;
 // Measured over test meshes; see PlannedErrorMm.
 constexpr double kPlannedGain = 0.5;
-// Responses fall with the degree; this allows for those of the second guard degree, which are not
-// measured, not doing so.
-constexpr double kGainAllowance = 1.5;
 
 absl::Status CheckOptions(const ResponseBasisOptions& options) {
   TF_RETURN_IF_ERROR(CheckTolerance(options.tolerance_mm));
@@ -81,96 +78,49 @@ ResponseBasisPlan PlanOfDegree(int degree, const MeshPreparation& preparation,
   plan.degree = degree;
   plan.num_terms =
       static_cast<int>(3 * SimplexPolynomials::NumTerms(k, degree)) + kColumnsPerHandle * k;
-  plan.bytes = CompressedResponse::BytesNeeded(num_vertices, CompressedResponse::Rows::kVertices,
-                                               plan.num_terms) +
-               RotationExpansion::BytesNeeded(k, degree + kGuardDegrees) +
+  plan.bytes = CompressedColumnsBytes(num_vertices, ColumnRows::kVertices, plan.num_terms) +
+               RotationExpansionBytes(k, degree + kGuardDegrees) +
                BytesOfPass(preparation, k, degree);
   return plan;
 }
 
-class ResponseBasis : public VertexResponse {
+// Makes the answers' parts one after the other.
+class ResponseBasisBuilder {
  public:
-  ResponseBasis(const ResponseBasisPlan& plan, const ResponseBasisOptions& options,
-                const SimplexDomain& domain, ChosenVertices chosen)
+  ResponseBasisBuilder(const ResponseBasisPlan& plan, const ResponseBasisOptions& options,
+                       const SimplexDomain& domain)
       : options_(options),
         num_polynomials_(
             SimplexPolynomials::NumTerms(static_cast<int>(domain.dimension()), plan.degree)),
         degree_(plan.degree),
         domain_(domain),
-        expansion_(domain, plan.degree + kGuardDegrees),
-        chosen_(std::move(chosen)),
-        columns_(chosen_.num_free(), plan.num_terms) {}
-
-  // `free`: those of the chosen vertices.
-  absl::Status Prepare(const std::vector<int32_t>& free, MeshPreparation* preparation,
-                       const Cancellation& cancellation) {
-    TF_RETURN_IF_ERROR(PrepareHandles(free, preparation, cancellation));
-    TF_RETURN_IF_ERROR(PreparePolynomials(free, preparation, cancellation));
-    TF_RETURN_IF_ERROR(cancellation.Check());
-    panel_.emplace(preparation->mesh().positions()(free, Eigen::all),
-                   CompressedResponse::Rows::kVertices, columns_, UsesOf(*preparation),
-                   options_.tolerance_mm);
-    columns_.resize(0, 0);
-    return absl::OkStatus();
-  }
-
-  double ErrorBoundMm(absl::Span<const HandlePose> poses) const override {
-    return Plan(poses).bound_mm;
-  }
-
-  bool Covers(absl::Span<const HandlePose> poses) const override {
-    return InRange(poses) && ErrorBoundMm(poses) <= options_.tolerance_mm;
-  }
-
-  void Evaluate(absl::Span<const HandlePose> poses, FloatPositions* positions) const override {
-    Write(poses, Plan(poses), positions);
-  }
-
-  std::optional<double> Answer(absl::Span<const HandlePose> poses,
-                               FloatPositions* positions) const override {
-    if (!InRange(poses)) return std::nullopt;
-    const PlannedAnswer plan = Plan(poses);
-    if (!(plan.bound_mm <= options_.tolerance_mm)) return std::nullopt;
-    Write(poses, plan, positions);
-    return plan.bound_mm;
-  }
-
-  PortableAnswers Describe() const override {
-    PortableAnswers answers;
-    chosen_.Describe(&answers);
-    panel_->Describe(&answers);
-    expansion_.Describe(&answers);
-    AnswerNumbers& numbers = answers.numbers;
+        polynomials_(static_cast<int>(domain.dimension()), plan.degree + kGuardDegrees) {
+    DescribeExpansion(domain_, polynomials_, &answers_);
+    AnswerNumbers& numbers = answers_.numbers;
     numbers.model = static_cast<double>(AnswerModel::kGradientField);
     numbers.tolerance_mm = options_.tolerance_mm;
     numbers.max_rotation_rad = options_.max_rotation_rad;
     numbers.max_scale_change = options_.max_scale_change;
     numbers.num_polynomials = static_cast<double>(num_polynomials_);
-    numbers.largest_gain_mm = largest_gain_;
-    answers.guard_gains.assign(guard_gains_.begin(), guard_gains_.end());
-    for (const Eigen::Vector3d& origin : origins_) {
-      answers.origins.insert(answers.origins.end(), origin.begin(), origin.end());
-    }
-    return answers;
   }
 
-  Eigen::Index num_vertices() const override { return chosen_.size(); }
-  int num_terms() const override { return static_cast<int>(panel_->num_columns()); }
-  int num_terms_before() const override { return static_cast<int>(panel_->num_columns_before()); }
-  int64_t bytes_held() const override {
-    return panel_->bytes_held() + chosen_.bytes_held() + expansion_.bytes_held() +
-           (guard_gains_.size() + 3 * static_cast<Eigen::Index>(origins_.size())) *
-               static_cast<int64_t>(sizeof(double));
+  absl::StatusOr<std::unique_ptr<VertexResponse>> Build(const std::vector<int32_t>& vertices,
+                                                        MeshPreparation* preparation,
+                                                        const Cancellation& cancellation) {
+    const Positions& rest = preparation->mesh().positions();
+    const std::vector<int32_t> free =
+        DescribeVertices(rest, preparation->constraints(), vertices, &answers_);
+    columns_.resize(static_cast<Eigen::Index>(free.size()),
+                    ColumnOfHandle(preparation->constraints().handles().size()));
+    TF_RETURN_IF_ERROR(PrepareHandles(free, preparation, cancellation));
+    TF_RETURN_IF_ERROR(PreparePolynomials(free, preparation, cancellation));
+    TF_RETURN_IF_ERROR(cancellation.Check());
+    CompressColumns(rest(free, Eigen::all), ColumnRows::kVertices, columns_, UsesOf(*preparation),
+                    options_.tolerance_mm, &answers_);
+    return std::make_unique<VertexResponse>(std::move(answers_), static_cast<int>(columns_.cols()));
   }
 
  private:
-  // Of poses.
-  struct PlannedAnswer {
-    CompressedResponse::EvaluationPlan reading;
-    double bound_mm = 0;  // with what the expansion leaves out
-  };
-
-  Eigen::Index num_columns() const { return ColumnOfHandle(origins_.size()); }
   Eigen::Index ColumnOfPolynomial(Eigen::Index n) const { return 3 * (num_polynomials_ - 1 - n); }
   Eigen::Index ColumnOfHandle(size_t h) const {
     return 3 * num_polynomials_ + kColumnsPerHandle * static_cast<Eigen::Index>(h);
@@ -179,7 +129,7 @@ class ResponseBasis : public VertexResponse {
   // Columns that are solved for: of the handles, and of the polynomials with a guard degree.
   int64_t NumSolved() const {
     const Eigen::Index measured =
-        SimplexPolynomials::NumTerms(expansion_.polynomials().dimension(), degree_ + 1);
+        SimplexPolynomials::NumTerms(polynomials_.dimension(), degree_ + 1);
     return columns_.cols() + 3 * (measured - num_polynomials_);
   }
   void TellSolved(int64_t columns) const {
@@ -194,9 +144,10 @@ class ResponseBasis : public VertexResponse {
       TF_RETURN_IF_ERROR(cancellation.Check());
       TellSolved(kColumnsPerHandle * static_cast<int64_t>(h));
       const Positions& rest = preparation->mesh().positions();
-      origins_.emplace_back(rest(handles[h].vertices, Eigen::all).colwise().mean());
+      const Eigen::Vector3d origin = rest(handles[h].vertices, Eigen::all).colwise().mean();
+      answers_.origins.insert(answers_.origins.end(), origin.begin(), origin.end());
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd X,
-                          HandleResponse(static_cast<int>(h), origins_.back(), preparation));
+                          HandleResponse(static_cast<int>(h), origin, preparation));
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
         columns_.col(ColumnOfHandle(h) + axis) = X(free, axis);
       }
@@ -205,25 +156,26 @@ class ResponseBasis : public VertexResponse {
     return absl::OkStatus();
   }
 
-  // Columns up to degree_, gains one degree further. Of every pass only the free rows are kept.
+  // Columns up to degree_, gains one degree further: the largest displacement that a polynomial of
+  // that degree gives one of the free ones, each, and that any one does. Of every pass only the
+  // free rows are kept.
   absl::Status PreparePolynomials(const std::vector<int32_t>& free, MeshPreparation* preparation,
                                   const Cancellation& cancellation) {
-    const SimplexPolynomials& polynomials = expansion_.polynomials();
     const Eigen::Index measured =
-        SimplexPolynomials::NumTerms(polynomials.dimension(), degree_ + 1);
-    guard_gains_.setZero(measured - num_polynomials_);
+        SimplexPolynomials::NumTerms(polynomials_.dimension(), degree_ + 1);
+    double& largest_gain = answers_.numbers.largest_gain_mm;
     for (Eigen::Index first = 0; first < measured; first += kTermsPerPass) {
       TellSolved(NumSolved() - 3 * (measured - first));
       TF_RETURN_IF_ERROR(cancellation.Check());
       const Eigen::Index count = std::min(kTermsPerPass, measured - first);
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
-                          TermResponses(domain_, polynomials, first, count, preparation));
+                          TermResponses(domain_, polynomials_, first, count, preparation));
       for (Eigen::Index n = first; n < first + count; ++n) {
         const Positions chosen = responses.middleCols<3>(3 * (n - first))(free, Eigen::all);
         const double gain = free.empty() ? 0 : chosen.rowwise().norm().maxCoeff();
-        largest_gain_ = std::max(largest_gain_, gain);
+        largest_gain = std::max(largest_gain, gain);
         if (n >= num_polynomials_) {
-          guard_gains_[n - num_polynomials_] = gain;
+          answers_.guard_gains.push_back(gain);
           continue;
         }
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -235,14 +187,6 @@ class ResponseBasis : public VertexResponse {
     return absl::OkStatus();
   }
 
-  bool InRange(absl::Span<const HandlePose> poses) const {
-    constexpr double kSlack = 1 + 1e-9;  // the edge of the range belongs to it
-    return std::all_of(poses.begin(), poses.end(), [this](const HandlePose& pose) {
-      return pose.rotation_vector.norm() <= options_.max_rotation_rad * kSlack &&
-             std::abs(pose.scale - 1) <= options_.max_scale_change + (kSlack - 1);
-    });
-  }
-
   ColumnWeights UsesOf(const MeshPreparation& preparation) const {
     constexpr int kSamples = 300;
     const double size_mm = preparation.mesh().BoundingBoxDiagonal();
@@ -252,87 +196,33 @@ class ResponseBasis : public VertexResponse {
                     .pivot_offset_mm = 0.1 * size_mm};
     const std::vector<Eigen::Vector3d> centroids = HandleCentroids(preparation);
     ColumnWeights uses{.factors = 3, .typical = {}, .widest = {}};
-    uses.typical = FactorsOf(SamplePoses(centroids, range, kSamples));
+    uses.typical = FactorsOfAll(SamplePoses(centroids, range, kSamples));
     // Moves have no range: a sixth of the mesh, which is 3 cm on a head, beside those of turns
     // about a far pivot. Farther ones are covered as far as the digits go that these need.
     range.translation_mm = 0.15 * size_mm;
     range.pivot_offset_mm = 0.9 * size_mm;
-    uses.widest = FactorsOf(SamplePoses(centroids, range, kSamples));
+    uses.widest = FactorsOfAll(SamplePoses(centroids, range, kSamples));
     return uses;
   }
 
-  Eigen::MatrixXd FactorsOf(const std::vector<std::vector<HandlePose>>& samples) const {
-    Eigen::MatrixXd factors(num_columns(), 3 * static_cast<Eigen::Index>(samples.size()));
+  Eigen::MatrixXd FactorsOfAll(const std::vector<std::vector<HandlePose>>& samples) const {
+    Eigen::MatrixXd factors(columns_.cols(), 3 * static_cast<Eigen::Index>(samples.size()));
     for (size_t s = 0; s < samples.size(); ++s) {
+      const std::vector<double> own = FactorsOf(answers_, ToAnswerPoses(samples[s])).factors;
       factors.middleCols<3>(3 * static_cast<Eigen::Index>(s)) =
-          Factors(samples[s], expansion_.Expand(samples[s]));
+          Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>(
+              own.data(), columns_.cols(), 3);
     }
     return factors;
   }
 
-  PlannedAnswer Plan(absl::Span<const HandlePose> poses) const {
-    const ExpansionCoefficients coefficients = expansion_.Expand(poses);
-    PlannedAnswer plan;
-    const double truncation_mm = TruncationBoundMm(poses, coefficients);
-    plan.reading =
-        panel_->Choose(Factors(poses, coefficients), options_.tolerance_mm - truncation_mm);
-    plan.bound_mm = std::max(truncation_mm + plan.reading.bound_mm, chosen_.RoundingBoundMm(poses));
-    return plan;
-  }
-
-  void Write(absl::Span<const HandlePose> poses, const PlannedAnswer& plan,
-             FloatPositions* positions) const {
-    positions->resize(chosen_.size(), 3);
-    panel_->Evaluate(plan.reading, positions);
-    chosen_.Complete(poses, positions);
-  }
-
-  Eigen::MatrixXd Factors(absl::Span<const HandlePose> poses,
-                          const ExpansionCoefficients& coefficients) const {
-    Eigen::MatrixXd factors(num_columns(), 3);
-    for (Eigen::Index n = 0; n < num_polynomials_; ++n) {
-      // Row-major C seen column-major is its transpose.
-      factors.middleRows<3>(ColumnOfPolynomial(n)) =
-          Eigen::Map<const Eigen::Matrix3d>(coefficients.row(n).data());
-    }
-    for (size_t h = 0; h < poses.size(); ++h) {
-      const HandlePose& pose = poses[h];
-      const Eigen::Matrix3d turn =
-          pose.scale * RotationMatrix(pose.rotation_vector) - Eigen::Matrix3d::Identity();
-      factors.middleRows<3>(ColumnOfHandle(h)) = turn.transpose();
-      factors.row(ColumnOfHandle(h) + 3) =
-          turn * (origins_[h] - pose.pivot_mm) + pose.translation_mm;
-    }
-    return factors;
-  }
-
-  double TruncationBoundMm(absl::Span<const HandlePose> poses,
-                           const ExpansionCoefficients& coefficients) const {
-    const Eigen::Index guards = guard_gains_.size();
-    if (guards == 0) {
-      return 0;
-    }
-    const Eigen::VectorXd sizes = coefficients.rowwise().norm();
-    const Eigen::Index unmeasured = sizes.size() - num_polynomials_ - guards;
-    return sizes.segment(num_polynomials_, guards).dot(guard_gains_) +
-           kGainAllowance * guard_gains_.maxCoeff() * sizes.tail(unmeasured).sum() +
-           largest_gain_ * expansion_.RemainderBound(poses, degree_ + kGuardDegrees);
-  }
-
-  // Constant after Prepare.
   const ResponseBasisOptions options_;
   const Eigen::Index num_polynomials_;
   const int degree_;
   const SimplexDomain domain_;
-  const RotationExpansion expansion_;  // with the guard degrees
-  const ChosenVertices chosen_;
-  Eigen::MatrixXd columns_;  // of the free ones; empty after Prepare
-  std::optional<CompressedResponse> panel_;
-  std::vector<Eigen::Vector3d> origins_;  // o_h
-  // Largest displacement that a polynomial of degree degree_ + 1 gives one of the free ones, each;
-  // and that any one does, mm.
-  Eigen::VectorXd guard_gains_;
-  double largest_gain_ = 0;
+  const SimplexPolynomials polynomials_;  // with the guard degrees
+  PortableAnswers answers_;
+  Eigen::MatrixXd columns_;  // of the free ones
 };
 
 }  // namespace
@@ -369,14 +259,10 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponseBasis(
     TF_RETURN_IF_ERROR(options.admission(plan.bytes));
   }
   TF_ASSIGN_OR_RETURN(const PreparedLaplacian* laplacian, preparation->Laplacian(cancellation));
-  ChosenVertices chosen(preparation->mesh().positions(), preparation->constraints(), vertices);
-  const std::vector<int32_t> free = chosen.FreeAmong(vertices);
-  auto basis = std::make_unique<ResponseBasis>(
-      plan, options,
-      EnclosingSimplex(SampleAtBarycentres(preparation->elements().cells, laplacian->harmonic)),
-      std::move(chosen));
-  TF_RETURN_IF_ERROR(basis->Prepare(free, preparation.get(), cancellation));
-  return basis;
+  return ResponseBasisBuilder(plan, options,
+                              EnclosingSimplex(SampleAtBarycentres(preparation->elements().cells,
+                                                                   laplacian->harmonic)))
+      .Build(vertices, preparation.get(), cancellation);
 }
 
 }  // namespace tissueform

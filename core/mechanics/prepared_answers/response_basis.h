@@ -47,7 +47,7 @@ absl::StatusOr<ResponseBasisPlan> PlanResponseBasis(const MeshPreparation& prepa
 // The response basis of the gradient field with propagated rotations and cotangent guidance, at
 // `vertices` (any order). In that mode the answer is linear in the rotation field P, and P depends
 // on the place through the harmonic values u only. With P - I = sum_n C_n(poses) B_n(u) (see
-// RotationExpansion), o_h the centroid of handle h and d the displacements,
+// ExpandRotation), o_h the centroid of handle h and d the displacements,
 //   d = sum_h [ (s_h R_h - I) X_h + (c_h - o_h + s_h R_h (o_h - c_h) + t_h) u_h ] + sum_n C_n Phi_n
 // (see TermResponses for X_h and Phi_n). Written for displacements: identity poses give rest.
 //

@@ -10,8 +10,8 @@
 #include "core/base/status_macros.h"
 #include "core/mechanics/answer_evaluator/pose_range.h"
 #include "core/mechanics/prepared_answers/column_compression.h"
+#include "core/mechanics/prepared_answers/column_packing.h"
 #include "core/mechanics/prepared_answers/linear_elastic_response.h"
-#include "core/mechanics/prepared_answers/quantized_matrix.h"
 #include "core/mechanics/uncertainty/material_expansion.h"
 #include "core/mechanics/uncertainty/uncertainty_band.h"
 
@@ -81,11 +81,7 @@ void BandColumns::Describe(PortableAnswers* answers) const {
   PortableAnswers compressed;
   compression.Describe(&compressed);
   answers->band_map = std::move(compressed.map);
-  QuantizedMatrix packed(stacked.rows(), compression.num_kept(), 0);
-  for (Eigen::Index c = 0; c < compression.num_kept(); ++c) {
-    packed.SetColumn(c, compression.kept().col(c));
-  }
-  packed.Describe(&answers->band);
+  PackColumns(compression.kept(), 0, &answers->band);
 }
 
 int64_t BandColumns::bytes_held() const {

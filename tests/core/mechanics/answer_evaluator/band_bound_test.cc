@@ -15,7 +15,6 @@
 #include "core/mechanics/answer_evaluator/answer_evaluator.h"
 #include "core/mechanics/answer_evaluator/pose_range.h"
 #include "core/mechanics/prepared_answers/create_response.h"
-#include "core/mechanics/prepared_answers/small_product.h"
 #include "core/mechanics/uncertainty/band_columns.h"
 #include "core/mechanics/uncertainty/material_expansion.h"
 #include "tests/core/mechanics/answer_evaluator/evaluated_problem.h"
@@ -40,7 +39,7 @@ MatrixXd FieldsOf(const PortableAnswers& answers) {
   const Eigen::Map<const Eigen::Matrix<int16_t, -1, -1>> upper(answers.band.upper.data(), rows,
                                                                columns);
   const Eigen::Map<const Eigen::VectorXd> steps(answers.band.steps.data(), columns);
-  const Eigen::Map<const RowMajorMatrix<double>> map(
+  const Eigen::Map<const Eigen::MatrixXd> map(
       answers.band_map.data(), columns, static_cast<Index>(answers.band_map.size()) / columns);
   return upper.cast<double>() * (65536 * steps).asDiagonal() * map;
 }

@@ -10,6 +10,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/mechanics/answer_evaluator/vertex_places.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/prepared_answers/create_response.h"
 #include "tests/testing/handle_problem.h"
@@ -35,13 +36,30 @@ Positions SevenPlaces() {
 
 ConstraintSet OfSeven() { return *ConstraintSet::Create(7, {1, 4}, {{"a", {0, 6}}, {"b", {3}}}); }
 
+// As a response has them.
+struct Chosen {
+  explicit Chosen(const std::vector<int32_t>& vertices)
+      : free(DescribeVertices(SevenPlaces(), OfSeven(), vertices, &answers)), places(answers) {}
+
+  void Complete(const std::vector<HandlePose>& poses, FloatPositions* positions) const {
+    places.Complete(answers, ToAnswerPoses(poses), positions->data());
+  }
+  double RoundingBoundMm(const std::vector<HandlePose>& poses) const {
+    return places.ErrorMm(ToAnswerPoses(poses));
+  }
+
+  PortableAnswers answers;
+  std::vector<int32_t> free;
+  VertexPlaces places;
+};
+
 TEST(ChosenVerticesTest, FreeOnesGoToTheirPlacesAndAllOthersToTheirs) {
   const Positions rest = SevenPlaces();
   const std::vector<int32_t> vertices = {4, 2, 5, 0, 2, 1, 3, 5};
-  const ChosenVertices chosen(rest, OfSeven(), vertices);
-  EXPECT_EQ(chosen.size(), 8);
-  EXPECT_EQ(chosen.num_free(), 4);
-  EXPECT_THAT(chosen.FreeAmong(vertices), ElementsAre(2, 5, 2, 5));
+  const Chosen chosen(vertices);
+  EXPECT_EQ(chosen.answers.regions.size(), size_t{8});
+  EXPECT_EQ(chosen.places.num_free(), size_t{4});
+  EXPECT_THAT(chosen.free, ElementsAre(2, 5, 2, 5));
 
   FloatPositions positions(8, 3);
   for (int row = 0; row < 4; ++row) positions.row(row).setConstant(static_cast<float>(100 + row));
@@ -69,7 +87,7 @@ TEST(ChosenVerticesTest, FreeOnesGoToTheirPlacesAndAllOthersToTheirs) {
 TEST(ChosenVerticesTest, HandlesAreWithinHalfAUnitInTheLastPlaceOfTheLargestCoordinate) {
   const Positions rest = SevenPlaces();
   const std::vector<int32_t> vertices = {0, 3, 6};
-  const ChosenVertices chosen(rest, OfSeven(), vertices);
+  const Chosen chosen(vertices);
   RandomNumbers random(3);
   FloatPositions positions(3, 3);
   double nearest = 0;
@@ -91,14 +109,14 @@ TEST(ChosenVerticesTest, HandlesAreWithinHalfAUnitInTheLastPlaceOfTheLargestCoor
 TEST(ChosenVerticesTest, NoneOrAllMayBeFree) {
   const Positions rest = SevenPlaces();
   const std::vector<HandlePose> poses(2);
-  const ChosenVertices free(rest, OfSeven(), {2, 5});
+  const Chosen free({2, 5});
   FloatPositions positions = FloatPositions::Constant(2, 3, 7);
   free.Complete(poses, &positions);
   EXPECT_EQ(positions, FloatPositions::Constant(2, 3, 7));
   EXPECT_EQ(free.RoundingBoundMm(poses), 0);
 
-  const ChosenVertices held(rest, OfSeven(), {6, 1});
-  EXPECT_THAT(held.FreeAmong({6, 1}), IsEmpty());
+  const Chosen held({6, 1});
+  EXPECT_THAT(held.free, IsEmpty());
   held.Complete(poses, &positions);
   EXPECT_EQ(positions.row(0), rest.row(6).cast<float>());
   EXPECT_EQ(positions.row(1), rest.row(1).cast<float>());

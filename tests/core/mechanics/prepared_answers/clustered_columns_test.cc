@@ -28,15 +28,22 @@ struct Line {
     }
   }
 
-  ClusteredColumns::Uses Uses(double room_mm) const {
+  ClusterUses Uses(double room_mm) const {
     return {.typical = 5 * Eigen::MatrixXd::Random(kColumns, 200),
             .tried = 5 * Eigen::MatrixXd::Random(kColumns, 100),
             .room_mm = Eigen::VectorXd::Constant(100, room_mm)};
   }
 
-  double ErrorMm(const ClusteredColumns& clustered, const Eigen::VectorXd& factors) const {
-    FloatPositions answer;
-    clustered.Evaluate(factors, &answer);
+  PortableAnswers Clustered(const ClusterUses& uses) const {
+    PortableAnswers answers;
+    const FloatPositions singles = rest.cast<float>();
+    answers.free_rest.assign(singles.data(), singles.data() + singles.size());
+    ClusterColumns(rest, columns, uses, &answers);
+    return answers;
+  }
+
+  double ErrorMm(const PortableAnswers& clustered, const Eigen::VectorXd& factors) const {
+    const FloatPositions answer = EvaluateClusters(clustered, factors);
     const Positions exact = rest + (columns * factors).reshaped<Eigen::RowMajor>(kVertices, 3);
     return (answer.cast<double>() - exact).rowwise().norm().maxCoeff();
   }
@@ -45,11 +52,16 @@ struct Line {
   Eigen::MatrixXd columns;
 };
 
+// The mean over the vertices.
+double ColumnsOf(const PortableAnswers& answers) {
+  return static_cast<double>(answers.columns.upper.size()) / (3 * kVertices);
+}
+
 TEST(ClusteredColumnsTest, EveryVertexIsAnsweredWithinTheRoomAtItsPlaceInTheAnswer) {
   const Line line;
   for (const double room : {1.0, 1e-2, 1e-4}) {
-    const ClusteredColumns::Uses uses = line.Uses(room);
-    const ClusteredColumns clustered(line.rest, line.columns, uses);
+    const ClusterUses uses = line.Uses(room);
+    const PortableAnswers clustered = line.Clustered(uses);
     for (Eigen::Index s = 0; s < uses.tried.cols(); ++s) {
       // What was cut, and as much as half of it for digits.
       EXPECT_LT(line.ErrorMm(clustered, uses.tried.col(s)), 1.5 * room + 2e-5) << room;
@@ -60,29 +72,31 @@ TEST(ClusteredColumnsTest, EveryVertexIsAnsweredWithinTheRoomAtItsPlaceInTheAnsw
 
 TEST(ClusteredColumnsTest, EveryClusterKeepsWhatIsUsedThere) {
   const Line line;
-  const ClusteredColumns clustered(line.rest, line.columns, line.Uses(1e-2));
-  EXPECT_EQ(clustered.num_vertices(), kVertices);
-  EXPECT_EQ(clustered.num_columns_before(), kColumns);
+  const PortableAnswers clustered = line.Clustered(line.Uses(1e-2));
+  EXPECT_EQ(clustered.cluster_vertices.size(), size_t{kVertices});
+  EXPECT_EQ(clustered.cluster_map.steps.size(), size_t{kColumns});
   // A sixth of the line meets some 12 of the bumps.
-  EXPECT_LT(clustered.num_columns(), 16);
-  EXPECT_GT(clustered.num_columns(), 6);
+  EXPECT_LT(ColumnsOf(clustered), 16);
+  EXPECT_GT(ColumnsOf(clustered), 6);
 }
 
 TEST(ClusteredColumnsTest, DigitsGrowWithWhatIsAskedFor) {
   const Line line;
-  const ClusteredColumns coarse(line.rest, line.columns, line.Uses(1e-2));
-  const ClusteredColumns fine(line.rest, line.columns, line.Uses(1e-5));
-  EXPECT_GT(static_cast<double>(fine.bytes_held()), 1.8 * static_cast<double>(coarse.bytes_held()));
-  EXPECT_LE(fine.bytes_held(), ClusteredColumns::BytesNeeded(kVertices, kColumns));
+  const PortableAnswers coarse = line.Clustered(line.Uses(1e-2));
+  const PortableAnswers fine = line.Clustered(line.Uses(1e-5));
+  const auto bytes = [](const PortableAnswers& answers) {
+    return static_cast<double>(sizeof(int16_t) *
+                               (answers.columns.upper.size() + answers.columns.lower.size()));
+  };
+  EXPECT_GT(bytes(fine), 1.8 * bytes(coarse));
+  EXPECT_LE(bytes(fine), static_cast<double>(ClusteredColumnsBytes(kVertices, kColumns)));
 }
 
 TEST(ClusteredColumnsTest, NothingIsKeptWhereTheRoomIsLarge) {
   const Line line;
-  const ClusteredColumns clustered(line.rest, line.columns, line.Uses(1e3));
-  EXPECT_EQ(clustered.num_columns(), 0);
-  FloatPositions answer;
-  clustered.Evaluate(Eigen::VectorXd::Ones(kColumns), &answer);
-  EXPECT_EQ(answer, line.rest.cast<float>());
+  const PortableAnswers clustered = line.Clustered(line.Uses(1e3));
+  EXPECT_EQ(ColumnsOf(clustered), 0);
+  EXPECT_EQ(EvaluateClusters(clustered, Eigen::VectorXd::Ones(kColumns)), line.rest.cast<float>());
 }
 
 }  // namespace

@@ -1,8 +1,9 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/mechanics/prepared_answers/small_product.h"
+#include "core/mechanics/answer_evaluator/small_product.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/base/instruction_set.h"
@@ -13,10 +14,10 @@ namespace {
 template <typename Scalar>
 struct Operands {
   const Scalar* a;  // column-major
-  Eigen::Index rows;
-  Eigen::Index inner;
+  size_t rows;
+  size_t inner;
   const Scalar* b;  // row-major
-  Eigen::Index cols;
+  size_t cols;
   Scalar* product;  // row-major
 };
 
@@ -29,14 +30,14 @@ struct Register {
 
 // Rows from `row` on, two registers of them, by kCols columns from `col` on.
 template <typename Scalar, InstructionSet kSet, int kCols>
-inline __attribute__((always_inline)) void MultiplyBlock(const Operands<Scalar>& of,
-                                                         Eigen::Index row, Eigen::Index col) {
+inline __attribute__((always_inline)) void MultiplyBlock(const Operands<Scalar>& of, size_t row,
+                                                         size_t col) {
   constexpr int kWide = Register<Scalar, kSet>::kLanes;
   using Lanes = typename Register<Scalar, kSet>::Lanes;
   Lanes sums[2][kCols] = {};
   Lanes first;
   Lanes second;
-  for (Eigen::Index j = 0; j < of.inner; ++j) {
+  for (size_t j = 0; j < of.inner; ++j) {
     // Copied bytewise, because `a` need not be aligned to a register.
     const Scalar* const a = of.a + j * of.rows + row;
     std::memcpy(&first, a, sizeof(first));
@@ -57,10 +58,9 @@ inline __attribute__((always_inline)) void MultiplyBlock(const Operands<Scalar>&
 }
 
 template <typename Scalar, InstructionSet kSet, int kCols>
-inline __attribute__((always_inline)) void MultiplyColumns(const Operands<Scalar>& of,
-                                                           Eigen::Index col) {
-  constexpr Eigen::Index kRows = 2 * Register<Scalar, kSet>::kLanes;
-  for (Eigen::Index row = 0; row + kRows <= of.rows; row += kRows) {
+inline __attribute__((always_inline)) void MultiplyColumns(const Operands<Scalar>& of, size_t col) {
+  constexpr size_t kRows = 2 * Register<Scalar, kSet>::kLanes;
+  for (size_t row = 0; row + kRows <= of.rows; row += kRows) {
     MultiplyBlock<Scalar, kSet, kCols>(of, row, col);
   }
   // The last rows once more with those before them: the same numbers.
@@ -70,7 +70,7 @@ inline __attribute__((always_inline)) void MultiplyColumns(const Operands<Scalar
 // REQUIRES: at least two registers of rows.
 template <typename Scalar, InstructionSet kSet>
 inline __attribute__((always_inline)) void MultiplyBody(const Operands<Scalar>& of) {
-  Eigen::Index col = 0;
+  size_t col = 0;
   for (; col + 3 <= of.cols; col += 3) MultiplyColumns<Scalar, kSet, 3>(of, col);
   for (; col < of.cols; ++col) MultiplyColumns<Scalar, kSet, 1>(of, col);
 }
@@ -94,26 +94,36 @@ template <typename Scalar>
 constexpr KernelVersions<void(const Operands<Scalar>&)> kMultiply{
     MultiplyBaseline<Scalar>, MultiplyAvx2<Scalar>, MultiplyAvx512<Scalar>};
 
+// For few rows, column by column of `a`.
 template <typename Scalar>
-RowMajorMatrix<Scalar> Multiply(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& a,
-                                const RowMajorMatrix<Scalar>& b) {
+void MultiplyFewRows(const Operands<Scalar>& of) {
+  std::fill_n(of.product, of.rows * of.cols, Scalar{0});
+  for (size_t j = 0; j < of.inner; ++j) {
+    for (size_t row = 0; row < of.rows; ++row) {
+      for (size_t f = 0; f < of.cols; ++f) {
+        of.product[row * of.cols + f] += of.a[j * of.rows + row] * of.b[j * of.cols + f];
+      }
+    }
+  }
+}
+
+template <typename Scalar>
+void Multiply(const Operands<Scalar>& of) {
   // Two of the widest registers, so that which path a matrix takes does not depend on the
   // processor.
-  constexpr int kFewestRows = 2 * Register<Scalar, InstructionSet::kAvx512>::kLanes;
-  if (a.rows() < kFewestRows) return a * b;
-  RowMajorMatrix<Scalar> product(a.rows(), b.cols());
-  kMultiply<Scalar>.Active()({a.data(), a.rows(), a.cols(), b.data(), b.cols(), product.data()});
-  return product;
+  constexpr size_t kFewestRows = 2 * Register<Scalar, InstructionSet::kAvx512>::kLanes;
+  if (of.rows < kFewestRows) return MultiplyFewRows(of);
+  kMultiply<Scalar>.Active()(of);
 }
 
 }  // namespace
 
-RowMajorMatrix<double> MultiplySmall(const Eigen::MatrixXd& a, const RowMajorMatrix<double>& b) {
-  return Multiply<double>(a, b);
+void MultiplySmall(const double* a, const double* b, const SmallSizes& sizes, double* product) {
+  Multiply<double>({a, sizes.rows, sizes.inner, b, sizes.cols, product});
 }
 
-RowMajorMatrix<float> MultiplySmall(const Eigen::MatrixXf& a, const RowMajorMatrix<float>& b) {
-  return Multiply<float>(a, b);
+void MultiplySmall(const float* a, const float* b, const SmallSizes& sizes, float* product) {
+  Multiply<float>({a, sizes.rows, sizes.inner, b, sizes.cols, product});
 }
 
 }  // namespace tissueform

@@ -1,12 +1,12 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/mechanics/prepared_answers/third_order_damping.h"
+#include "core/mechanics/prepared_answers/third_order_lengths.h"
 
 #include "gtest/gtest.h"
 
+#include "core/mechanics/answer_evaluator/series_terms.h"
 #include "core/mechanics/elasticity/neo_hookean_expansion.h"
-#include "core/mechanics/prepared_answers/pose_numbers.h"
 
 namespace tissueform {
 namespace {
@@ -18,6 +18,11 @@ Eigen::MatrixXd ColumnsOf(const Eigen::VectorXd& sizes, Eigen::Index rows, uint3
   return Eigen::MatrixXd::Random(rows, sizes.size()) * sizes.cwiseAbs().asDiagonal();
 }
 
+Eigen::VectorXd PairProducts(const Eigen::VectorXd& numbers) {
+  const SeriesTerms terms = TermsOf({}, {numbers.begin(), numbers.end()});
+  return Eigen::Map<const Eigen::VectorXd>(terms.pairs.data(), NumFieldPairs(numbers.size()));
+}
+
 struct Columns {
   explicit Columns(Eigen::Index rows) {
     const Eigen::VectorXd units = (Eigen::VectorXd(6) << 50, 40, 30, 1, 1, 1).finished();
@@ -26,7 +31,10 @@ struct Columns {
   }
 
   double Ratio(const Eigen::VectorXd& numbers) const {
-    return ThirdOrderDamping(second, third).Ratio(PairProducts(numbers), TripleProducts(numbers));
+    PortableAnswers answers;
+    answers.second_lengths = LengthsOf(second);
+    answers.third_lengths = LengthsOf(third);
+    return TermsOf(answers, {numbers.begin(), numbers.end()}).ratio;
   }
   double Expected(const Eigen::VectorXd& numbers) const {
     return (third * TripleProducts(numbers)).norm() / (second * PairProducts(numbers)).norm();
@@ -36,10 +44,10 @@ struct Columns {
   Eigen::MatrixXd third;
 };
 
-class ThirdOrderDampingTest : public ::testing::TestWithParam<int> {};
+class ThirdOrderLengthsTest : public ::testing::TestWithParam<int> {};
 
 // Turns alone, moves alone, and both; of more rows than columns, and of fewer.
-TEST_P(ThirdOrderDampingTest, RatioIsThatOfTheDisplacementsLengths) {
+TEST_P(ThirdOrderLengthsTest, RatioIsThatOfTheDisplacementsLengths) {
   const Columns columns(3 * GetParam());
   std::srand(3);
   for (int sample = 0; sample < 30; ++sample) {
@@ -51,7 +59,7 @@ TEST_P(ThirdOrderDampingTest, RatioIsThatOfTheDisplacementsLengths) {
   }
 }
 
-TEST_P(ThirdOrderDampingTest, RestAndColumnsOfNothingHaveNone) {
+TEST_P(ThirdOrderLengthsTest, RestAndColumnsOfNothingHaveNone) {
   Columns columns(3 * GetParam());
   EXPECT_EQ(columns.Ratio(Eigen::VectorXd::Zero(6)), 0);
   columns.second.setZero();
@@ -59,7 +67,7 @@ TEST_P(ThirdOrderDampingTest, RestAndColumnsOfNothingHaveNone) {
   EXPECT_EQ(columns.Ratio(Eigen::VectorXd::Ones(6)), 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Vertices, ThirdOrderDampingTest, ::testing::Values(1, 200),
+INSTANTIATE_TEST_SUITE_P(Vertices, ThirdOrderLengthsTest, ::testing::Values(1, 200),
                          [](const auto& test) { return test.param == 1 ? "One" : "Many"; });
 
 }  // namespace

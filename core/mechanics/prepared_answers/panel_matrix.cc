@@ -1,24 +1,23 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/mechanics/prepared_answers/quantized_matrix.h"
+#include "core/mechanics/prepared_answers/panel_matrix.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "core/base/instruction_set.h"
 
 namespace tissueform {
 namespace {
 
-constexpr int kPairs = QuantizedMatrix::kPanelRows / 2;
+constexpr size_t kPairs = PanelMatrix::kPanelRows / 2;
 
 // Vector registers of an instruction set.
 template <InstructionSet kSet>
 struct Register {
   static constexpr int kLanes = RegisterBytes(kSet) / static_cast<int>(sizeof(float));
-  static constexpr int kInPanel = kPairs / kLanes;  // registers of pairs in a column of a panel
+  static constexpr int kInPanel =
+      static_cast<int>(kPairs) / kLanes;  // registers of pairs in a column of a panel
   using Floats [[gnu::vector_size(RegisterBytes(kSet))]] = float;
   using Pairs [[gnu::vector_size(RegisterBytes(kSet)), gnu::may_alias]] = int32_t;
 };
@@ -27,10 +26,10 @@ struct Register {
 struct Operands {
   const int32_t* upper;
   const int32_t* lower;
-  Eigen::Index rows;
-  Eigen::Index cols;
-  Eigen::Index full_cols;
-  QuantizedMatrix::EvaluationPlan reading;
+  size_t rows;
+  size_t cols;
+  size_t full_cols;
+  ColumnReading reading;
   const float* factors;  // #cols by 1 or 3, row-major
 };
 
@@ -73,16 +72,15 @@ inline __attribute__((always_inline)) void AddPairs(const int32_t* upper, const 
 // Adds columns begin to end of kPanels panels from `panel` on, with all digits where kIsFull.
 template <InstructionSet kSet, int kFactors, int kPanels, bool kIsFull>
 inline __attribute__((always_inline)) void AddColumns(
-    const Operands& of, Eigen::Index panel, int first_register, Eigen::Index begin,
-    Eigen::Index end,
+    const Operands& of, size_t panel, int first_register, size_t begin, size_t end,
     typename Block<kSet, kFactors>::Sums (&sums)[kPanels][Block<kSet, kFactors>::kRegisters]) {
   constexpr int kLanes = Register<kSet>::kLanes;
   const int32_t* const upper = of.upper + panel * of.cols * kPairs + first_register * kLanes;
   const int32_t* const lower = of.lower + panel * of.full_cols * kPairs + first_register * kLanes;
-  const Eigen::Index only_upper = of.cols - of.full_cols;
+  const size_t only_upper = of.cols - of.full_cols;
   // What comes next: the processor's own look ahead ends at every page of 4 KiB.
-  const Eigen::Index ahead = kPanels * of.cols * kPairs;
-  for (Eigen::Index c = begin; c < end; ++c) {
+  const size_t ahead = kPanels * of.cols * kPairs;
+  for (size_t c = begin; c < end; ++c) {
     for (int p = 0; p < kPanels; ++p) {
       const int32_t* const at = upper + (p * of.cols + c) * kPairs;
       __builtin_prefetch(at + ahead);
@@ -98,8 +96,8 @@ inline __attribute__((always_inline)) void AddColumns(
 
 // The first `rows` rows of kPanels neighboring panels.
 template <InstructionSet kSet, int kFactors, int kPanels>
-inline __attribute__((always_inline)) void MultiplyBlock(const Operands& of, Eigen::Index panel,
-                                                         int first_register, Eigen::Index rows,
+inline __attribute__((always_inline)) void MultiplyBlock(const Operands& of, size_t panel,
+                                                         int first_register, size_t rows,
                                                          float* product) {
   constexpr int kRegisters = Block<kSet, kFactors>::kRegisters;
   constexpr int kLanes = Register<kSet>::kLanes;
@@ -110,7 +108,7 @@ inline __attribute__((always_inline)) void MultiplyBlock(const Operands& of, Eig
                                             of.cols, sums);
   for (int half = 0; half < 2 * kPanels; ++half) {
     for (int lane = 0; lane < kRegisters * kLanes; ++lane) {
-      const Eigen::Index row = half * kPairs + first_register * kLanes + lane;
+      const size_t row = half * kPairs + first_register * kLanes + lane;
       if (row >= rows) break;
       for (int f = 0; f < kFactors; ++f) {
         product[kFactors * row + f] = sums[half / 2][lane / kLanes][half % 2][f][lane % kLanes];
@@ -120,8 +118,8 @@ inline __attribute__((always_inline)) void MultiplyBlock(const Operands& of, Eig
 }
 
 template <InstructionSet kSet, int kFactors, int kPanels>
-inline __attribute__((always_inline)) void MultiplyPanels(const Operands& of, Eigen::Index panel,
-                                                          Eigen::Index rows, float* product) {
+inline __attribute__((always_inline)) void MultiplyPanels(const Operands& of, size_t panel,
+                                                          size_t rows, float* product) {
   for (int r = 0; r < Register<kSet>::kInPanel; r += Block<kSet, kFactors>::kRegisters) {
     MultiplyBlock<kSet, kFactors, kPanels>(of, panel, r, rows, product);
   }
@@ -130,9 +128,9 @@ inline __attribute__((always_inline)) void MultiplyPanels(const Operands& of, Ei
 template <InstructionSet kSet, int kFactors>
 inline __attribute__((always_inline)) void MultiplyBody(const Operands& of, float* product) {
   constexpr int kPanels = Block<kSet, kFactors>::kPanels;
-  constexpr Eigen::Index kRows = QuantizedMatrix::kPanelRows;
-  constexpr Eigen::Index kStep = kPanels * kRows;
-  Eigen::Index row = 0;
+  constexpr size_t kRows = PanelMatrix::kPanelRows;
+  constexpr size_t kStep = kPanels * kRows;
+  size_t row = 0;
   for (; row + kStep <= of.rows; row += kStep) {
     MultiplyPanels<kSet, kFactors, kPanels>(of, row / kRows, kStep, product + kFactors * row);
   }
@@ -161,89 +159,80 @@ template <int kFactors>
 constexpr KernelVersions<void(const Operands&, float*)> kMultiply{
     MultiplyBaseline<kFactors>, MultiplyAvx2<kFactors>, MultiplyAvx512<kFactors>};
 
-void PutHalf(int64_t half, bool second, int32_t* pair) {
-  const auto bits = static_cast<uint32_t>(half & 0xffff);
+void PutHalf(int16_t half, bool second, int32_t* pair) {
+  const auto bits = static_cast<uint32_t>(static_cast<uint16_t>(half));
   const auto others = static_cast<uint32_t>(*pair);
   *pair = static_cast<int32_t>(second ? (others & 0xffffU) | bits << 16
                                       : (others & 0xffff0000U) | bits);
 }
 
-Eigen::Index NumPanels(Eigen::Index rows) {
-  return (rows + QuantizedMatrix::kPanelRows - 1) / QuantizedMatrix::kPanelRows;
+size_t NumPanels(size_t rows) {
+  return (rows + PanelMatrix::kPanelRows - 1) / PanelMatrix::kPanelRows;
+}
+
+// `halves` of `columns` columns, one behind the other, into panels.
+template <typename Panel>
+void PutHalves(const int16_t* halves, size_t rows, size_t columns, std::vector<Panel>* panels) {
+  for (size_t c = 0; c < columns; ++c) {
+    for (size_t row = 0; row < rows; ++row) {
+      Panel& panel = (*panels)[row / PanelMatrix::kPanelRows * columns + c];
+      PutHalf(halves[c * rows + row], row % PanelMatrix::kPanelRows >= kPairs,
+              &panel.pairs[row % kPairs]);
+    }
+  }
+}
+
+template <typename Panel>
+void AppendHalves(const std::vector<Panel>& panels, size_t rows, size_t columns,
+                  std::vector<int16_t>* halves) {
+  for (size_t c = 0; c < columns; ++c) {
+    for (size_t row = 0; row < rows; ++row) {
+      const Panel& panel = panels[row / PanelMatrix::kPanelRows * columns + c];
+      const int32_t pair = panel.pairs[row % kPairs];
+      halves->push_back(static_cast<int16_t>(row % PanelMatrix::kPanelRows < kPairs ? pair & 0xffff
+                                                                                    : pair >> 16));
+    }
+  }
 }
 
 }  // namespace
 
-QuantizedMatrix::QuantizedMatrix(Eigen::Index rows, Eigen::Index cols, Eigen::Index full_cols)
-    : rows_(rows),
-      cols_(cols),
-      full_cols_(full_cols),
-      steps_(cols, 0.0),
-      upper_(NumPanels(rows) * cols),
-      lower_(NumPanels(rows) * full_cols) {}
-
-// The largest entry's upper half is the largest that there is.
-double QuantizedMatrix::UpperStepOf(double largest) {
-  return largest / double{std::numeric_limits<int16_t>::max()};
+PanelMatrix::PanelMatrix(const PackedPart& part)
+    : rows_(part.rows),
+      columns_(part.columns),
+      full_columns_(part.full),
+      steps_(part.steps, part.steps + part.columns),
+      upper_(NumPanels(part.rows) * part.columns),
+      lower_(NumPanels(part.rows) * part.full) {
+  PutHalves(part.upper, rows_, columns_, &upper_);
+  PutHalves(part.lower, rows_, full_columns_, &lower_);
 }
 
-void QuantizedMatrix::SetColumn(Eigen::Index column,
-                                const Eigen::Ref<const Eigen::VectorXd>& values) {
-  const double step = UpperStepOf(rows_ > 0 ? values.cwiseAbs().maxCoeff() : 0) / kUpper;
-  steps_[column] = step;
-  const Eigen::Index full_column = column - (cols_ - full_cols_);  // negative: none
-  for (Eigen::Index row = 0; row < rows_; ++row) {
-    const int64_t whole = step > 0 ? std::llround(values[row] / step) : 0;
-    // To the nearest, so that the lower half has a sign of its own.
-    const int64_t upper = (whole + kUpper / 2) >> 16;
-    const Eigen::Index panel = row / kPanelRows;
-    const Eigen::Index lane = row % kPairs;
-    const bool second = row % kPanelRows >= kPairs;
-    PutHalf(upper, second, &upper_[panel * cols_ + column].pairs[lane]);
-    if (full_column >= 0) {
-      PutHalf(whole - upper * kUpper, second,
-              &lower_[panel * full_cols_ + full_column].pairs[lane]);
-    }
-  }
-}
-
-void QuantizedMatrix::Multiply(const Eigen::MatrixXd& factors, const EvaluationPlan& reading,
-                               float* product) const {
+void PanelMatrix::Multiply(const double* factors, size_t width, const ColumnReading& reading,
+                           float* product) const {
   if (upper_.empty()) {
-    std::fill_n(product, rows_ * factors.cols(), 0.0F);
+    std::fill_n(product, rows_ * width, 0.0F);
     return;
   }
-  std::vector<float> scaled;
-  scaled.reserve(static_cast<size_t>(factors.size()));
-  for (Eigen::Index c = 0; c < cols_; ++c) {
-    for (Eigen::Index f = 0; f < factors.cols(); ++f) {
-      scaled.push_back(static_cast<float>(factors(c, f) * steps_[c]));
-    }
+  std::vector<float> scaled(columns_ * width);
+  for (size_t i = 0; i < scaled.size(); ++i) {
+    scaled[i] = static_cast<float>(factors[i] * steps_[i / width]);
   }
   const int32_t* const lower = lower_.empty() ? nullptr : lower_.front().pairs;
-  const Operands of{upper_.front().pairs, lower, rows_, cols_, full_cols_, reading, scaled.data()};
-  const auto& multiply = factors.cols() == 1 ? kMultiply<1> : kMultiply<3>;
+  const Operands of{upper_.front().pairs, lower,   rows_,        columns_,
+                    full_columns_,        reading, scaled.data()};
+  const auto& multiply = width == 1 ? kMultiply<1> : kMultiply<3>;
   multiply.Active()(of, product);
 }
 
-void QuantizedMatrix::Describe(PackedColumns* packed) const {
+void PanelMatrix::Unpack(PackedColumns* packed) const {
   packed->steps.insert(packed->steps.end(), steps_.begin(), steps_.end());
-  const auto append = [this](const std::vector<Panel>& panels, Eigen::Index cols,
-                             std::vector<int16_t>* halves) {
-    for (Eigen::Index c = 0; c < cols; ++c) {
-      for (Eigen::Index row = 0; row < rows_; ++row) {
-        const int32_t pair = panels[row / kPanelRows * cols + c].pairs[row % kPairs];
-        halves->push_back(
-            static_cast<int16_t>(row % kPanelRows < kPairs ? pair & 0xffff : pair >> 16));
-      }
-    }
-  };
-  append(upper_, cols_, &packed->upper);
-  append(lower_, full_cols_, &packed->lower);
+  AppendHalves(upper_, rows_, columns_, &packed->upper);
+  AppendHalves(lower_, rows_, full_columns_, &packed->lower);
 }
 
-int64_t QuantizedMatrix::BytesNeeded(Eigen::Index rows, Eigen::Index cols, Eigen::Index full_cols) {
-  return NumPanels(rows) * (cols + full_cols) * static_cast<int64_t>(sizeof(Panel));
+size_t PanelMatrix::BytesNeeded(size_t rows, size_t columns, size_t full_columns) {
+  return NumPanels(rows) * (columns + full_columns) * sizeof(Panel);
 }
 
 }  // namespace tissueform
