@@ -14,10 +14,10 @@ std::array<double, 9> TurnMinusIdentity(const std::array<double, 3>& rotation_ve
   if (angle == 0) return turn;
   const std::array<double, 3> k = {rotation_vector[0] / angle, rotation_vector[1] / angle,
                                    rotation_vector[2] / angle};
-  const double sine = scale * std::sin(angle);
-  // Of 1 - cos(angle), without the digits that the difference would lose.
-  const double half = std::sin(angle / 2);
-  const double versine = scale * 2 * half * half;
+  // By the half angle: 1 - cos(angle) itself would lose digits.
+  const double sine_of_half = std::sin(angle / 2);
+  const double sine = scale * 2 * sine_of_half * std::cos(angle / 2);
+  const double versine = scale * 2 * sine_of_half * sine_of_half;
   const std::array<double, 9> cross = {0, -k[2], k[1], k[2], 0, -k[0], -k[1], k[0], 0};
   for (size_t i = 0; i < 3; ++i) {
     for (size_t j = 0; j < 3; ++j) {
@@ -35,12 +35,6 @@ AnswerMotion MotionAbout(const AnswerPose& pose, const double* point) {
     }
   }
   return motion;
-}
-
-double RowNorm(const double* row, size_t width) {
-  double square = 0;
-  for (size_t f = 0; f < width; ++f) square += row[f] * row[f];
-  return std::sqrt(square);
 }
 
 }  // namespace tissueform

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 namespace tissueform {
@@ -29,6 +30,11 @@ std::array<double, 9> TurnMinusIdentity(const std::array<double, 3>& rotation_ve
 AnswerMotion MotionAbout(const AnswerPose& pose, const double* point);
 
 // The length of a row of so many numbers.
-double RowNorm(const double* row, size_t width);
+template <typename Number>
+double RowNorm(const Number* row, size_t width) {
+  double square = 0;
+  for (size_t f = 0; f < width; ++f) square += double{row[f]} * double{row[f]};
+  return std::sqrt(square);
+}
 
 }  // namespace tissueform

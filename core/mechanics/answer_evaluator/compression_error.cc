@@ -4,7 +4,6 @@
 #include "core/mechanics/answer_evaluator/compression_error.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -20,12 +19,6 @@ constexpr double kUpper = 65536;  // steps in one of the upper half
 // Part of the tolerance: what a frame leaves out of its small columns, where the digits of the
 // others allow it.
 constexpr double kLeftOutOfTolerance = 0.2;
-
-double NormOf(const float* row, size_t width) {
-  std::array<double, 3> numbers = {};
-  std::copy_n(row, width, numbers.begin());
-  return RowNorm(numbers.data(), width);
-}
 
 std::vector<double> RowNorms(const std::vector<double>& matrix, size_t width) {
   std::vector<double> norms(matrix.size() / width);
@@ -58,9 +51,9 @@ double CutErrorMm(const PortableAnswers& answers, const AnswerSizes& sizes,
   std::vector<float> cut(rows * width);
   MultiplySmall(answers.cut_map.data(), singles.data(), {rows, sizes.factors, width}, cut.data());
   double error = 0;
-  for (size_t row = 0; row < rows; ++row) error += NormOf(cut.data() + row * width, width);
+  for (size_t row = 0; row < rows; ++row) error += RowNorm(cut.data() + row * width, width);
   for (size_t j = 0; j < sizes.factors; ++j) {
-    error += double{answers.tail[j]} * NormOf(singles.data() + j * width, width);
+    error += double{answers.tail[j]} * RowNorm(singles.data() + j * width, width);
   }
   return kBoundRounding * error;
 }

@@ -112,8 +112,7 @@ void FreeVertices<Matrix>::Move(const PortableAnswers& answers, const AnswerSize
 
 template <typename Matrix>
 void FreeVertices<Matrix>::MoveClusters(const PortableAnswers& answers,
-                                        const std::vector<double>& mapped,
-                                        float* positions) const {
+                                        const std::vector<double>& mapped, float* positions) const {
   const double* factors = mapped.data();
   const int32_t* vertex = answers.cluster_vertices.data();
   std::vector<float> moves;

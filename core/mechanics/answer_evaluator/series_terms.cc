@@ -96,8 +96,7 @@ double SecondOrderErrorMm(const PortableAnswers& answers, const std::vector<doub
   const std::vector<float> moves = ProductWith(answers.probes, pairs);
   double farthest = 0;
   for (size_t first = 0; first < moves.size(); first += 3) {
-    const std::array<double, 3> move = {moves[first], moves[first + 1], moves[first + 2]};
-    farthest = std::max(farthest, RowNorm(move.data(), 3));
+    farthest = std::max(farthest, RowNorm(moves.data() + first, 3));
   }
   const double root = std::sqrt(farthest * SingleMm(answers.second_gains, pairs));
   return answers.numbers.estimate_scale * root * std::sqrt(root / answers.numbers.size_mm);

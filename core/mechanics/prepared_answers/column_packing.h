@@ -9,10 +9,10 @@
 
 namespace tissueform {
 
-// Appends columns as fixed-point numbers of 32 bits, each column by its own largest one; of the last
-// `full` columns all digits, of the others their upper half. Entries whose upper half alone is kept
-// lie at most half of 65536 steps from what they are; all digits lose less than single precision
-// does. REQUIRES: finite values.
+// Appends columns as fixed-point numbers of 32 bits, each column by its own largest one; of the
+// last `full` columns all digits, of the others their upper half. Entries whose upper half alone is
+// kept lie at most half of 65536 steps from what they are; all digits lose less than single
+// precision does. REQUIRES: finite values.
 void PackColumns(const Eigen::Ref<const Eigen::MatrixXd>& columns, Eigen::Index full,
                  PackedColumns* packed);
 
