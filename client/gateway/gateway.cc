@@ -28,7 +28,7 @@ std::vector<NodeAddress> ServersOf(const GatewayOptions& options) {
 
 absl::Status CheckServers(const GatewayOptions& options) {
   TF_RETURN_IF_ERROR(ServerChoice::Check(ServersOf(options)));
-  if (options.insecure || !options.upstream.roots.empty()) return absl::OkStatus();
+  if (options.insecure || !options.upstream.authorities.empty()) return absl::OkStatus();
   for (const auto& [node, server] : ServersOf(options)) {
     std::string host = server.substr(0, server.rfind(':'));
     if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
@@ -49,7 +49,7 @@ absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& op
   TF_RETURN_IF_ERROR(CheckServers(options));
   TF_RETURN_IF_ERROR(ForwardedAddresses::CheckProxies(options.trusted_proxies));
   std::unique_ptr<RotatedFiles> tls_files;
-  if (!options.upstream.roots.empty()) {
+  if (!options.upstream.authorities.empty()) {
     TF_ASSIGN_OR_RETURN(tls_files, RotatedFiles::Load(options.upstream));
   }
   WebFiles files;

@@ -16,6 +16,7 @@
 #include "client/gateway/http_server.h"
 #include "client/gateway/server_pool.h"
 #include "server/platform/metrics_page.h"
+#include "server/platform/rotated_files.h"
 
 namespace tissueform {
 

@@ -10,6 +10,7 @@
 #include "absl/strings/string_view.h"
 
 #include "server/platform/program_options.h"
+#include "server/platform/tls_options.h"
 
 namespace tissueform {
 namespace {
@@ -92,19 +93,15 @@ void AddLogin(CLI::App& app, LoginConfig* login) {
 }
 
 void AddUpstreamOptions(CLI::App& app, GatewayOptions* options) {
-  CLI::Option* ca = app.add_option("--server-ca", options->upstream.roots,
-                                   "authorities of the servers' certificates, in PEM; enables "
-                                   "encryption. Rewrite the file to renew it")
-                        ->type_name("FILE");
-  CLI::Option* certificate =
-      app.add_option("--cert", options->upstream.certificate,
-                     "the gateway's certificate, for servers that request one")
-          ->type_name("FILE")
-          ->needs(ca);
-  CLI::Option* key = app.add_option("--key", options->upstream.key, "key of the client certificate")
-                         ->type_name("FILE")
-                         ->needs(certificate);
-  certificate->needs(key);
+  CLI::Option* const ca = AddPemOption(app, {"--server-ca",
+                                             "authorities of the servers' certificates, in PEM; "
+                                             "enables encryption. Rewrite the file to renew it",
+                                             &options->upstream.authorities});
+  AddIdentityOptions(app,
+                     {"--cert", "the gateway's certificate, for servers that request one",
+                      &options->upstream.certificate},
+                     {"--key", "key of the gateway's certificate", &options->upstream.key})
+      ->needs(ca);
   app.add_flag("--insecure", options->insecure,
                "allow unencrypted calls to servers on other machines");
   app.add_option("--trust-forwarded-from", options->trusted_proxies,

@@ -117,7 +117,7 @@ TEST_F(TransportProgramsTest, TheGatewaysCertificateDoesNotStandForItsUsers) {
   options.port = 0;
   options.upstream = {.certificate = gateway_files.certificate,
                       .key = gateway_files.key,
-                      .roots = gateway_files.roots};
+                      .authorities = gateway_files.roots};
   ASSERT_OK_AND_ASSIGN(const auto gateway, Gateway::Start(options));
   ASSERT_TRUE(Eventually([&] { return gateway->pool().IsReady(); }));
   WriteTestFile(folder_ / "empty", std::string(5, '\0'));
@@ -140,7 +140,7 @@ TEST_F(TransportProgramsTest, AGatewayJudgesTheServersCertificate) {
   options.servers = {absl::StrCat("localhost:", server().port())};
   options.port = 0;
   options.upstream = {
-      .certificate = client_.certificate, .key = client_.key, .roots = strange.roots};
+      .certificate = client_.certificate, .key = client_.key, .authorities = strange.roots};
   ASSERT_OK_AND_ASSIGN(const auto gateway, Gateway::Start(options));
   WriteTestFile(folder_ / "empty", std::string(5, '\0'));
   ASSERT_EQ(Run(absl::StrCat("curl --silent --noproxy '*' --max-time 30 --include -H "

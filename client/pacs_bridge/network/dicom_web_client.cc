@@ -277,12 +277,8 @@ absl::StatusOr<std::unique_ptr<PacsClient>> MakeDicomWebClient(const PacsPeer& p
   PacsPeer checked = peer;
   checked.url = std::string(absl::StripSuffix(peer.url, "/"));
   TF_RETURN_IF_ERROR(CheckPacsUrl(checked));
-  if (peer.tls && !peer.tls->authorities.empty()) {
-    TF_RETURN_IF_ERROR(ReadPemFile(peer.tls->authorities).status());
-  }
-  if (peer.tls && !peer.tls->certificate.empty()) {
-    TF_RETURN_IF_ERROR(ReadPemFile(peer.tls->certificate).status());
-    TF_RETURN_IF_ERROR(ReadSecretPemFile(peer.tls->key).status());
+  if (peer.tls) {
+    TF_RETURN_IF_ERROR(ReadTlsFiles(*peer.tls).status());
   }
   return std::make_unique<DicomWebClient>(std::move(checked));
 }

@@ -58,8 +58,8 @@ struct HttpRequest {
   std::chrono::seconds silence_time{0};  // without a byte in either direction; 0: no limit
   size_t max_body_bytes = 0;             // of an answer without a sink
 
-  // Takes the body piece by piece; `answer` has the status and the content type, and its body is the
-  // sink's to fill. False ends the exchange.
+  // Takes the body piece by piece; `answer` has the status and the content type, and its body is
+  // the sink's to fill. False ends the exchange.
   std::function<bool(HttpAnswer* answer, absl::string_view piece)> sink = nullptr;
   // Ends the exchange within a second of being true. Null: nothing ends it.
   const std::atomic<bool>* stopping = nullptr;

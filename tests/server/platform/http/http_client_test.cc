@@ -58,8 +58,9 @@ TEST(ReadUrl, TellsWhereSecretsMayGo) {
     ASSERT_TRUE(ReadUrl(url)) << url;
     EXPECT_TRUE(ReadUrl(url)->IsConfidential()) << url;
   }
-  for (const char* url : {"http://a.example", "http://localhost.example", "http://127.0.0.1.example",
-                          "http://localhost@a.example/", "ftp://localhost", "file:///etc/passwd"}) {
+  for (const char* url :
+       {"http://a.example", "http://localhost.example", "http://127.0.0.1.example",
+        "http://localhost@a.example/", "ftp://localhost", "file:///etc/passwd"}) {
     ASSERT_TRUE(ReadUrl(url)) << url;
     EXPECT_FALSE(ReadUrl(url)->IsConfidential()) << url;
   }
