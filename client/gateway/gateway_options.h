@@ -16,7 +16,8 @@ namespace tissueform {
 
 // Everything that can be set about a gateway.
 struct GatewayOptions {
-  std::vector<std::string> servers;  // [NODE=]ADDRESS, as gRPC has addresses
+  // Of the server, or of the HAProxy before several: HOST:PORT or unix:/PATH.
+  std::string server;
   // Encryption to the servers: authorities of their certificates, and the gateway's own.
   // Empty: none.
   TlsFiles upstream = {};
