@@ -42,6 +42,7 @@ REST_RATE = 1         # with columns a page needs a frame now and then, to confi
 DATABASE_COMMITS = 4670
 RENEWAL_S = 3          # leases; the table of nodes is written every second
 PROXY_CONNECTIONS = 8000  # deploy/haproxy/cluster.cfg, maxconn
+PASSES = 2            # of a page's call through HAProxy: to a gateway, and from there to a server
 STREAMS, WATCHES = 512, 2048  # of a server: deploy/kubernetes/server.yaml
 SOCKETS = 2048        # of a gateway: docs/gateway.md, --max-sockets
 BUDGET = 0.75         # of a machine's memory (deploy/kubernetes)
@@ -178,7 +179,7 @@ def demand(figures, way, planners, followers, moving):
     nodes = math.ceil(cores / carried)
     memory_nodes = math.ceil(planners * figures.session_gib / (MEMORY_GIB * BUDGET))
     return {"frames": drags * rate + watched, "gbit": bits / 1e9, "cores": cores, "nodes": max(nodes, memory_nodes) + 1, "by": "memory" if memory_nodes > nodes else "cores",
-            "proxies": math.ceil(max(bits / 1e9 / (0.7 * GBIT), bits / 8 * figures.proxy_s_per_byte / (0.7 * CORES), (planners + followers) / PROXY_CONNECTIONS)) + 1,
+            "proxies": math.ceil(PASSES * max(bits / 1e9 / (0.7 * GBIT), bits / 8 * figures.proxy_s_per_byte / (0.7 * CORES), (planners + followers) / PROXY_CONNECTIONS)) + 1,
             "writes": writes(planners, moving, max(nodes, memory_nodes) + 1)}
 
 
@@ -209,9 +210,9 @@ def limits(figures, nodes=3, proxies=2, gateways=2):
     carried = most_streams(way[1], RATE, CORES) * RATE * way[1]
     parts = {f"processors of {nodes} servers": nodes * carried / (need["cores"] / 1000),
              f"memory of {nodes} servers, a head each": nodes * MEMORY_GIB * BUDGET / figures.session_gib,
-             f"network of {proxies} HAProxys": proxies * 0.7 * GBIT / (need["gbit"] / 1000),
-             f"processors of {proxies} HAProxys": proxies * 0.7 * CORES / (need["gbit"] * 1e9 / 8 * figures.proxy_s_per_byte / 1000),
-             f"connections of {proxies} HAProxys": proxies * PROXY_CONNECTIONS / (1 + followers),
+             f"network of {proxies} HAProxys": proxies * 0.7 * GBIT / (PASSES * need["gbit"] / 1000),
+             f"processors of {proxies} HAProxys": proxies * 0.7 * CORES / (PASSES * need["gbit"] * 1e9 / 8 * figures.proxy_s_per_byte / 1000),
+             f"connections of {proxies} HAProxys": proxies * PROXY_CONNECTIONS / (PASSES * (1 + followers)),
              f"drags open on {nodes} servers, `--max-streams {STREAMS}`": nodes * STREAMS,
              f"watches open on {nodes} servers, `--max-watches {WATCHES}`": nodes * WATCHES / followers,
              f"sockets of {gateways} gateways, `--max-sockets {SOCKETS}`": gateways * SOCKETS / (1 + followers),

@@ -3,7 +3,6 @@
 
 #include "client/cpp/server_channel.h"
 
-#include <chrono>
 #include <utility>
 #include <vector>
 
@@ -67,27 +66,14 @@ bool IsLoopbackIpv4(absl::string_view host) {
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> CredentialsOf(
     const ConnectionOptions& options) {
   if (!options.encrypted()) return grpc::InsecureChannelCredentials();
-  if (options.tls_certificate.empty() != options.tls_key.empty()) {
-    return absl::InvalidArgumentError("give both certificate and key");
-  }
-  grpc::SslCredentialsOptions tls;
-  if (!options.tls_ca.empty()) {
-    TF_ASSIGN_OR_RETURN(tls.pem_root_certs, ReadPemFile(options.tls_ca));
-    if (const absl::Status status = CheckAuthorities(tls.pem_root_certs); !status.ok()) {
-      return absl::InvalidArgumentError(absl::StrCat(options.tls_ca, ": ", status.message()));
-    }
-  }
-  if (!options.tls_certificate.empty()) {
-    TF_ASSIGN_OR_RETURN(tls.pem_cert_chain, ReadPemFile(options.tls_certificate));
-    TF_ASSIGN_OR_RETURN(tls.pem_private_key, ReadSecretPemFile(options.tls_key));
-    const auto facts =
-        CheckIdentity(tls.pem_cert_chain, tls.pem_private_key, std::chrono::system_clock::now());
-    if (!facts.ok()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(options.tls_certificate, ": ", facts.status().message()));
-    }
-  }
-  return grpc::SslCredentials(tls);
+  const TlsFiles files = {.certificate = options.tls_certificate,
+                          .key = options.tls_key,
+                          .authorities = options.tls_ca};
+  TF_ASSIGN_OR_RETURN(const TlsContents contents, ReadTlsFiles(files));
+  TF_RETURN_IF_ERROR(CheckTlsContents(files, contents).status());
+  return grpc::SslCredentials({.pem_root_certs = contents.authorities,
+                               .pem_private_key = contents.key,
+                               .pem_cert_chain = contents.certificate});
 }
 
 }  // namespace

@@ -20,36 +20,27 @@ namespace tissueform {
 
 namespace {
 
-std::vector<NodeAddress> ServersOf(const GatewayOptions& options) {
-  std::vector<NodeAddress> servers;
-  for (const std::string& server : options.servers) servers.push_back(ParseNodeAddress(server));
-  return servers;
-}
-
-absl::Status CheckServers(const GatewayOptions& options) {
-  TF_RETURN_IF_ERROR(ServerChoice::Check(ServersOf(options)));
-  if (options.insecure || !options.upstream.roots.empty()) return absl::OkStatus();
-  for (const auto& [node, server] : ServersOf(options)) {
-    std::string host = server.substr(0, server.rfind(':'));
-    if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
-    if (absl::StartsWith(server, "unix:") || IsLoopback(host)) continue;
-    return absl::FailedPreconditionError(
-        absl::StrCat("--server ", server,
-                     " is another machine, and tokens are sent there; give "
-                     "--server-ca FILE, or --insecure if the network between "
-                     "is isolated"));
-  }
-  return absl::OkStatus();
+absl::Status CheckServer(const GatewayOptions& options) {
+  const std::string& server = options.server;
+  if (options.insecure || !options.upstream.authorities.empty()) return absl::OkStatus();
+  std::string host = server.substr(0, server.rfind(':'));
+  if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
+  if (absl::StartsWith(server, "unix:") || IsLoopback(host)) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat("--server ", server,
+                   " is another machine, and tokens are sent there; give "
+                   "--server-ca FILE, or --insecure if the network between "
+                   "is isolated"));
 }
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& options) {
   TF_RETURN_IF_ERROR(CheckLoginConfig(options.login));
-  TF_RETURN_IF_ERROR(CheckServers(options));
+  TF_RETURN_IF_ERROR(CheckServer(options));
   TF_RETURN_IF_ERROR(ForwardedAddresses::CheckProxies(options.trusted_proxies));
   std::unique_ptr<RotatedFiles> tls_files;
-  if (!options.upstream.roots.empty()) {
+  if (!options.upstream.authorities.empty()) {
     TF_ASSIGN_OR_RETURN(tls_files, RotatedFiles::Load(options.upstream));
   }
   WebFiles files;
@@ -70,7 +61,7 @@ Gateway::Gateway(const GatewayOptions& options, WebFiles files,
                  std::unique_ptr<RotatedFiles> tls_files)
     : options_(options),
       tls_files_(std::move(tls_files)),
-      pool_(ServersOf(options), options.limits, MakeChannelCredentials(tls_files_.get())),
+      pool_(options.server, options.limits, MakeChannelCredentials(tls_files_.get())),
       routes_(AccessRules(options.host, options.allowed_hosts, options.allowed_origins),
               ForwardedAddresses(options.trusted_proxies), std::move(files), options.login, &pool_,
               &counters_) {}

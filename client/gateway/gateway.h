@@ -14,18 +14,19 @@
 #include "client/gateway/gateway_options.h"
 #include "client/gateway/gateway_routes.h"
 #include "client/gateway/http_server.h"
-#include "client/gateway/server_pool.h"
+#include "client/gateway/upstream_pool.h"
 #include "server/platform/metrics_page.h"
+#include "server/platform/rotated_files.h"
 
 namespace tissueform {
 
 // A running gateway: the only place where its objects are joined.
 class Gateway {
  public:
-  // Listens when it returns; servers need not be there yet.
+  // Listens when it returns; the server need not be there yet.
   //
   // Errors: Unavailable, naming the address, when it cannot be listened on; FailedPrecondition
-  // (servers on other machines without encryption); those of CheckLoginConfig, WebFiles::Load,
+  // (a server on another machine without encryption); those of CheckLoginConfig, WebFiles::Load,
   // RotatedFiles::Load, ForwardedAddresses::CheckProxies and MetricsPage::Serve.
   static absl::StatusOr<std::unique_ptr<Gateway>> Start(const GatewayOptions& options);
 
@@ -37,7 +38,7 @@ class Gateway {
   // On which Prometheus finds the page of metrics; 0: there is none.
   int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
   const GatewayCounters& counters() const { return counters_; }
-  const ServerPool& pool() const { return pool_; }
+  const UpstreamPool& pool() const { return pool_; }
 
   // Ends in good order: nothing more is accepted, every call is told UNAVAILABLE, sockets get their
   // end frame and close with 1001. Blocks until that is done, or its deadline. One thread, once.
@@ -52,9 +53,9 @@ class Gateway {
   const GatewayOptions options_;
 
   // Self-synchronised; each may use those before it, and is destroyed before them.
-  const std::unique_ptr<RotatedFiles> tls_files_;  // null: servers without encryption
+  const std::unique_ptr<RotatedFiles> tls_files_;  // null: no encryption
   GatewayCounters counters_;
-  ServerPool pool_;
+  UpstreamPool pool_;
   GatewayRoutes routes_;
   std::unique_ptr<HttpServer> http_;
   std::optional<MetricsPage> metrics_;  // reads what the others count

@@ -26,7 +26,6 @@ constexpr std::array<absl::string_view, static_cast<size_t>(GatewayEvent::kLast)
         "wrong_subprotocol",
         "too_many_sockets",
         "no_call_slot",
-        "wrong_node",
         "method_refused",
         "metadata_refused",
         "malformed_frame",

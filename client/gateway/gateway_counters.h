@@ -34,7 +34,6 @@ enum class GatewayEvent {
   kWrongSubprotocol,
   kTooManySockets,
   kNoCallSlot,
-  kWrongNode,
   kMethodRefused,
   kMetadataRefused,
   kMalformedFrame,

@@ -22,8 +22,8 @@ struct GatewayLimits {
   int connections_per_address = 2048;
   // Of these WebSockets; what is more is answered with 503.
   int sockets = 2048;
-  // Calls at the same time on one connection to a server, which takes 128, and such connections to
-  // each.
+  // Calls at the same time on one connection to the server, which takes 128 (HAProxy: 100), and
+  // such connections.
   int calls_per_channel = 100;
   int channels_per_server = 24;
   // A request's header, from its first byte; its body; the start of a socket.

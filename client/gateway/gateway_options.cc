@@ -5,11 +5,15 @@
 
 #include <cstdint>
 #include <limits>
+#include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
 #include "server/platform/program_options.h"
+#include "server/platform/tls_options.h"
 
 namespace tissueform {
 namespace {
@@ -20,6 +24,7 @@ constexpr int64_t kMebibyte = 1 << 20;
 // A body and a message fit into an int of protobuf's.
 constexpr int64_t kMaxMebibytes = 1024;
 constexpr int64_t kMaxSeconds = 24 * 3600;
+constexpr int kMaxPort = 65535;
 
 template <typename Target>
 void AddLimit(CLI::App& app, const std::string& name, Target* target, int64_t unit, int64_t most,
@@ -56,9 +61,9 @@ void AddLimits(CLI::App& app, GatewayLimits* limits) {
            "open connections per address (IPv6: per /64 network); a proxy is one address");
   AddLimit(app, "--max-sockets", &limits->sockets, 1, kMax, "open WebSockets; 503 above it");
   AddLimit(app, "--calls-per-channel", &limits->calls_per_channel, 1, kMax,
-           "calls on one connection to a server, less than its limit (128)");
-  AddLimit(app, "--channels-per-server", &limits->channels_per_server, 1, 1024,
-           "connections to each server; without a free one a call is refused with "
+           "calls on one connection to the server, which takes 128 (HAProxy: 100)");
+  AddLimit(app, "--channels-per-server", &limits->channels_per_server, 1, kMax,
+           "connections to the server; without a free one a call is refused with "
            "RESOURCE_EXHAUSTED");
   AddSeconds(app, "--header-seconds", &limits->header_deadline,
              "time for a request's header, from its first byte");
@@ -92,24 +97,45 @@ void AddLogin(CLI::App& app, LoginConfig* login) {
 }
 
 void AddUpstreamOptions(CLI::App& app, GatewayOptions* options) {
-  CLI::Option* ca = app.add_option("--server-ca", options->upstream.roots,
-                                   "authorities of the servers' certificates, in PEM; enables "
-                                   "encryption. Rewrite the file to renew it")
-                        ->type_name("FILE");
-  CLI::Option* certificate =
-      app.add_option("--cert", options->upstream.certificate,
-                     "the gateway's certificate, for servers that request one")
-          ->type_name("FILE")
-          ->needs(ca);
-  CLI::Option* key = app.add_option("--key", options->upstream.key, "key of the client certificate")
-                         ->type_name("FILE")
-                         ->needs(certificate);
-  certificate->needs(key);
+  CLI::Option* const ca = AddPemOption(app, {"--server-ca",
+                                             "authorities of the server's certificate, in PEM; "
+                                             "enables encryption. Rewrite the file to renew it",
+                                             &options->upstream.authorities});
+  AddIdentityOptions(app,
+                     {"--cert", "the gateway's certificate, if the server requests one",
+                      &options->upstream.certificate},
+                     {"--key", "key of the gateway's certificate", &options->upstream.key})
+      ->needs(ca);
   app.add_flag("--insecure", options->insecure,
-               "allow unencrypted calls to servers on other machines");
+               "allow unencrypted calls to a server on another machine");
   app.add_option("--trust-forwarded-from", options->trusted_proxies,
                  "address of a proxy whose X-Forwarded-For is trusted")
       ->type_name("ADDRESS");
+}
+
+// "unix:/PATH", or "HOST:PORT" with a host that has no "=".
+bool IsAddress(absl::string_view text) {
+  if (absl::StartsWith(text, "unix:")) return true;
+  const size_t colon = text.rfind(':');
+  int port = 0;
+  return colon != absl::string_view::npos && colon > 0 && !absl::StrContains(text, '=') &&
+         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= kMaxPort;
+}
+
+// Up to version 0.2 the gateway chose among several servers: NODE=ADDRESS...
+std::string SetServer(const std::vector<std::string>& addresses, GatewayOptions* options) {
+  constexpr absl::string_view kOneAddress =
+      "the gateway takes one address; put HAProxy before the servers and give its address "
+      "(docs/gateway.md, \"Several servers\")";
+  if (addresses.size() != 1) return absl::StrCat(addresses.size(), " addresses: ", kOneAddress);
+  const std::string& address = addresses.front();
+  if (!IsAddress(address)) {
+    const bool names_node = absl::StrContains(address, '=');
+    return absl::StrCat(address, names_node ? " names a node: " : " is not an address: ",
+                        names_node ? kOneAddress : "give HOST:PORT or unix:/PATH");
+  }
+  options->server = address;
+  return {};
 }
 
 // "HOST:PORT", IPv6 in brackets.
@@ -120,7 +146,8 @@ std::string SetListen(const std::string& text, GatewayOptions* options) {
   const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
   const bool fine = colon != std::string::npos && !host.empty() &&
                     (bracketed || host.find(':') == absl::string_view::npos) &&
-                    absl::SimpleAtoi(text.substr(colon + 1), &port) && port >= 0 && port <= 65535;
+                    absl::SimpleAtoi(text.substr(colon + 1), &port) && port >= 0 &&
+                    port <= kMaxPort;
   if (!fine) return "HOST:PORT required, port 0 for a free one, IPv6 in brackets";
   options->host = std::string(bracketed ? host.substr(1, host.size() - 2) : host);
   options->port = port;
@@ -130,11 +157,16 @@ std::string SetListen(const std::string& text, GatewayOptions* options) {
 }  // namespace
 
 void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
-  app.add_option("--server", options->servers,
-                 "address of a tissueform-server, HOST:PORT or unix:/PATH (repeatable); in "
-                 "a cluster NODE=ADDRESS, with its --node-name")
+  app.add_option_function<std::vector<std::string>>(
+         "--server",
+         [options](const std::vector<std::string>& addresses) {
+           const std::string error = SetServer(addresses, options);
+           if (!error.empty()) throw CLI::ValidationError("--server", error);
+         },
+         "address of the tissueform-server, or of the HAProxy before several: HOST:PORT or "
+         "unix:/PATH")
       ->required()
-      ->type_name("[NODE=]ADDRESS");
+      ->type_name("ADDRESS");
   app.add_option_function<std::string>(
          "--listen",
          [options](const std::string& text) {
@@ -172,7 +204,7 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
   app.add_option("--metrics-port", options->metrics_port,
                  "port of 127.0.0.1 for Prometheus' /metrics; 0 takes a free one (default: "
                  "none)")
-      ->check(CLI::Range(0, 65535));
+      ->check(CLI::Range(0, kMaxPort));
   AddConfiguration(app, "TISSUEFORM_GATEWAY_");  // last: it looks at all options
 }
 

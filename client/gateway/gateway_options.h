@@ -10,15 +10,17 @@
 
 #include "client/gateway/gateway_limits.h"
 #include "client/gateway/login_config.h"
-#include "server/platform/rotated_files.h"
+#include "core/base/certificates.h"
 
 namespace tissueform {
 
 // Everything that can be set about a gateway.
 struct GatewayOptions {
-  std::vector<std::string> servers;  // [NODE=]ADDRESS, as gRPC has addresses
-  // Encryption to the servers: `roots` of their certificates, and the gateway's own. Empty: none.
-  RotatedFiles::Paths upstream = {};
+  // Of the server, or of the HAProxy before several: HOST:PORT or unix:/PATH.
+  std::string server;
+  // Encryption to the servers: authorities of their certificates, and the gateway's own.
+  // Empty: none.
+  TlsFiles upstream = {};
   bool insecure = false;  // to servers on other machines without encryption all the same
   // Proxies whose X-Forwarded-For counts.
   std::vector<std::string> trusted_proxies = {};

@@ -70,7 +70,8 @@ bool OffersSubprotocol(const HttpHead& head) {
 }  // namespace
 
 GatewayRoutes::GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
-                             const LoginConfig& login, ServerPool* pool, GatewayCounters* counters)
+                             const LoginConfig& login, UpstreamPool* pool,
+                             GatewayCounters* counters)
     : rules_(std::move(rules)),
       addresses_(std::move(addresses)),
       files_(std::move(files)),

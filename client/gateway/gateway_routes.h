@@ -13,7 +13,7 @@
 #include "client/gateway/gateway_counters.h"
 #include "client/gateway/http_server.h"
 #include "client/gateway/login_config.h"
-#include "client/gateway/server_pool.h"
+#include "client/gateway/upstream_pool.h"
 #include "client/gateway/web_files.h"
 
 namespace tissueform {
@@ -23,7 +23,7 @@ class GatewayRoutes final : public HttpHandler {
  public:
   // `pool` and `counters` must outlive it.
   GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
-                const LoginConfig& login, ServerPool* pool, GatewayCounters* counters);
+                const LoginConfig& login, UpstreamPool* pool, GatewayCounters* counters);
 
   HttpDecision Decide(const HttpHead& head) override;
   std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
@@ -53,7 +53,7 @@ class GatewayRoutes final : public HttpHandler {
   const std::string security_policy_;
 
   // Self-synchronised.
-  ServerPool* const pool_;
+  UpstreamPool* const pool_;
   GatewayCounters* const counters_;
 };
 

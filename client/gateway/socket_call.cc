@@ -55,9 +55,8 @@ void SocketCall::Start(absl::string_view payload) {
     return Fail(event, start.status(), SocketClose::kProtocolError);
   }
   start->metadata[kClientAddressHeader] = client_address_;
-  absl::StatusOr<CallSlot> slot =
-      pool_->Take(start->Metadata("x-tissueform-session"), start->Metadata("x-tissueform-node"));
-  if (!slot.ok()) return Fail(EventOf(slot.status()), slot.status(), SocketClose::kNormal);
+  absl::StatusOr<CallSlot> slot = pool_->Take();
+  if (!slot.ok()) return Fail(GatewayEvent::kNoCallSlot, slot.status(), SocketClose::kNormal);
   started_ = true;
   tells_begin_ = start->tells_begin;
   wants_heartbeat_ = start->wants_heartbeat;

@@ -13,9 +13,9 @@
 
 #include "client/gateway/gateway_counters.h"
 #include "client/gateway/http_server.h"
-#include "client/gateway/server_pool.h"
 #include "client/gateway/socket_frames.h"
 #include "client/gateway/upstream_call.h"
+#include "client/gateway/upstream_pool.h"
 
 namespace tissueform {
 
@@ -26,7 +26,7 @@ class SocketCall final : public SocketUser,
                          public std::enable_shared_from_this<SocketCall> {
  public:
   // `client_address`: what the server is told. `pool` and `counters` outlive it.
-  SocketCall(std::shared_ptr<Socket> socket, std::string client_address, ServerPool* pool,
+  SocketCall(std::shared_ptr<Socket> socket, std::string client_address, UpstreamPool* pool,
              GatewayCounters* counters)
       : socket_(std::move(socket)),
         client_address_(std::move(client_address)),
@@ -62,7 +62,7 @@ class SocketCall final : public SocketUser,
   // Constant until the socket is gone.
   std::shared_ptr<Socket> socket_;
   const std::string client_address_;
-  ServerPool* const pool_;
+  UpstreamPool* const pool_;
   GatewayCounters* const counters_;
   // The strand's.
   std::shared_ptr<UpstreamCall> upstream_;

@@ -17,7 +17,7 @@
 #include "grpcpp/support/status.h"
 
 #include "client/gateway/http_server.h"
-#include "client/gateway/server_pool.h"
+#include "client/gateway/upstream_pool.h"
 
 namespace tissueform {
 
@@ -28,12 +28,6 @@ struct CallStart {
   std::optional<std::chrono::nanoseconds> timeout = std::nullopt;
   bool tells_begin = false;  // of a socket: the server's headers go to the client before all else
   bool wants_heartbeat = false;  // of a socket: the gateway is never silent for long
-
-  // Empty where there is none of that name.
-  absl::string_view Metadata(const std::string& name) const {
-    const auto found = metadata.find(name);
-    return found == metadata.end() ? absl::string_view() : absl::string_view(found->second);
-  }
 };
 
 // How a call ended.

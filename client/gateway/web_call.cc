@@ -57,18 +57,13 @@ CallEnd EndOf(const absl::Status& status) {
                                  std::string(status.message()), details.SerializeAsString())};
 }
 
-GatewayEvent EventOf(const absl::Status& no_slot) {
-  return HasReason(no_slot, ErrorReason::kWrongNode) ? GatewayEvent::kWrongNode
-                                                     : GatewayEvent::kNoCallSlot;
-}
-
-void WebCall::Begin(const HttpHead& head, absl::string_view body, ServerPool* pool,
+void WebCall::Begin(const HttpHead& head, absl::string_view body, UpstreamPool* pool,
                     GatewayCounters* counters) {
   const absl::Status status = TryBegin(head, body, pool, counters);
   if (!status.ok()) OnEnd(EndOf(status));
 }
 
-absl::Status WebCall::TryBegin(const HttpHead& head, absl::string_view body, ServerPool* pool,
+absl::Status WebCall::TryBegin(const HttpHead& head, absl::string_view body, UpstreamPool* pool,
                                GatewayCounters* counters) {
   const auto counted = [counters](GatewayEvent event, const absl::Status& status) {
     counters->Add(event);
@@ -84,8 +79,8 @@ absl::Status WebCall::TryBegin(const HttpHead& head, absl::string_view body, Ser
   start->metadata[kClientAddressHeader] = client_address_;
   const auto message = ParseWebRequest(body);
   if (!message.ok()) return counted(GatewayEvent::kMalformedFrame, message.status());
-  auto slot = pool->Take(head.Field("x-tissueform-session"), head.Field("x-tissueform-node"));
-  if (!slot.ok()) return counted(EventOf(slot.status()), slot.status());
+  auto slot = pool->Take();
+  if (!slot.ok()) return counted(GatewayEvent::kNoCallSlot, slot.status());
   counters->Add(GatewayEvent::kWebCall);
   upstream_ = UpstreamCall::Begin(*std::move(slot), *start, reply_, shared_from_this());
   upstream_->Write(std::string(*message));

@@ -13,8 +13,8 @@
 
 #include "client/gateway/gateway_counters.h"
 #include "client/gateway/http_server.h"
-#include "client/gateway/server_pool.h"
 #include "client/gateway/upstream_call.h"
+#include "client/gateway/upstream_pool.h"
 
 namespace tissueform {
 
@@ -31,7 +31,7 @@ class WebCall final : public ReplySource,
         client_address_(std::move(client_address)) {}
 
   // Once. Makes the call, or tells the client why not. `pool` outlives it.
-  void Begin(const HttpHead& head, absl::string_view body, ServerPool* pool,
+  void Begin(const HttpHead& head, absl::string_view body, UpstreamPool* pool,
              GatewayCounters* counters);
 
   void OnSent() override;
@@ -43,7 +43,7 @@ class WebCall final : public ReplySource,
   void OnEnd(CallEnd end) override;
 
  private:
-  absl::Status TryBegin(const HttpHead& head, absl::string_view body, ServerPool* pool,
+  absl::Status TryBegin(const HttpHead& head, absl::string_view body, UpstreamPool* pool,
                         GatewayCounters* counters);
   void SendEnd(CallEnd end);
   void BeginReply(const HttpFields& fields);
@@ -62,8 +62,5 @@ class WebCall final : public ReplySource,
 
 // As a call's end: code, message and reason.
 CallEnd EndOf(const absl::Status& status);
-
-// As what it is counted that ServerPool::Take gave no place.
-GatewayEvent EventOf(const absl::Status& no_slot);
 
 }  // namespace tissueform

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -16,8 +17,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
-#include "client/gateway/stable_hash.h"
-
 namespace tissueform {
 namespace {
 
@@ -27,6 +26,19 @@ constexpr size_t kMaxFiles = 4096;
 constexpr size_t kMaxBytes = size_t{256} << 20;
 // Of a bundler's hash in a name.
 constexpr size_t kMinHashLetters = 8;
+
+// FNV-1a with the finalizer of splitmix64: gateways beside each other must give a file one ETag.
+// Not against adversaries.
+uint64_t StableHash(absl::string_view text) {
+  uint64_t hash = 0xcbf29ce484222325;
+  for (const char c : text) {
+    hash ^= static_cast<unsigned char>(c);
+    hash *= 0x100000001b3;
+  }
+  hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9;
+  hash = (hash ^ (hash >> 27)) * 0x94d049bb133111eb;
+  return hash ^ (hash >> 31);
+}
 
 constexpr std::array<std::pair<absl::string_view, absl::string_view>, 17> kTypes = {{
     {".css", "text/css; charset=utf-8"},

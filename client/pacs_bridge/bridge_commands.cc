@@ -93,7 +93,7 @@ BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : op
       app.add_subcommand("build", "build and pack the plan of a series, regardless of the rules");
   build_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
   publish_ = app.add_subcommand("publish", "publish the case of a series to the server");
-  publish_->add_option("SERIES", name_, "key of the client certificate")->required();
+  publish_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
   store_ =
       app.add_subcommand("store", "show the patient of a prediction, and store it in the PACS");
   store_->add_option("EXPORT", name_, "exports/ID, as `status` shows it")->required();

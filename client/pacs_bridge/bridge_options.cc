@@ -13,6 +13,7 @@
 
 #include "core/base/status_macros.h"
 #include "server/platform/program_options.h"
+#include "server/platform/tls_options.h"
 
 namespace tissueform {
 namespace {
@@ -75,18 +76,14 @@ void AddReceiver(CLI::App& app, BridgeOptions* options) {
       app, "--watermark-mib", options->watermark_bytes / kBytesOfMebibyte, 1, kMaxSetting,
       [options](int64_t value) { options->watermark_bytes = value * kBytesOfMebibyte; },
       "minimum free disk space; below it C-STORE is refused with 0xA700");
-  CLI::Option* certificate =
-      app.add_option("--dicom-cert", options->tls.certificate,
-                     "the bridge's certificate for DICOM, PEM; requires TLS for receiving")
-          ->type_name("FILE");
-  CLI::Option* key =
-      app.add_option("--dicom-key", options->tls.key, "key of the client certificate")
-          ->type_name("FILE");
-  CLI::Option* authorities = app.add_option("--dicom-ca", options->tls.authorities,
-                                            "authorities of senders and of the PACS")
-                                 ->type_name("FILE");
-  certificate->needs(key)->needs(authorities);
-  key->needs(certificate);
+  CLI::Option* const authorities = AddPemOption(
+      app, {"--dicom-ca", "authorities of senders and of the PACS", &options->tls.authorities});
+  AddIdentityOptions(
+      app,
+      {"--dicom-cert", "the bridge's certificate for DICOM, PEM; requires TLS for receiving",
+       &options->tls.certificate},
+      {"--dicom-key", "key of the bridge's certificate", &options->tls.key})
+      ->needs(authorities);
 }
 
 void AddPacs(CLI::App& app, PacsPeer* pacs) {
@@ -147,14 +144,12 @@ void AddServer(CLI::App& app, BridgeOptions* options) {
   ConnectionOptions* connection = &options->connection;
   app.add_flag("--server-tls", connection->tls,
                "use TLS with this machine's certificate authorities");
-  app.add_option("--server-ca", connection->tls_ca,
-                 "use TLS with the certificate authorities in this file (PEM)")
-      ->type_name("FILE");
-  app.add_option("--server-cert", connection->tls_certificate,
-                 "the bridge's certificate, if the server requests one")
-      ->type_name("FILE");
-  app.add_option("--server-key", connection->tls_key, "key of the client certificate")
-      ->type_name("FILE");
+  AddPemOption(app, {"--server-ca", "use TLS with the certificate authorities in this file (PEM)",
+                     &connection->tls_ca});
+  AddIdentityOptions(app,
+                     {"--server-cert", "the bridge's certificate, if the server requests one",
+                      &connection->tls_certificate},
+                     {"--server-key", "key of the bridge's certificate", &connection->tls_key});
   app.add_option("--server-token-file", connection->token_file,
                  "the bridge's token, with the roles publisher and bridge; mode 0600, reloaded "
                  "when renewed")

@@ -110,6 +110,11 @@ absl::Status CheckDates(const CertificateFacts& facts, std::chrono::system_clock
   return absl::OkStatus();
 }
 
+absl::Status WithFile(const absl::Status& status, const std::string& path) {
+  if (status.ok()) return status;
+  return {status.code(), absl::StrCat(path, ": ", status.message())};
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> ReadPemFile(const std::string& path) {
@@ -184,6 +189,33 @@ absl::Status CheckAuthorities(absl::string_view pem) {
         absl::StrCat("has no certificate in PEM after the ", count, " that could be read"));
   }
   return absl::OkStatus();
+}
+
+absl::StatusOr<TlsContents> ReadTlsFiles(const TlsFiles& files) {
+  if (files.certificate.empty() != files.key.empty()) {
+    return absl::InvalidArgumentError("give both certificate and key");
+  }
+  TlsContents contents;
+  if (!files.authorities.empty()) {
+    TF_ASSIGN_OR_RETURN(contents.authorities, ReadPemFile(files.authorities));
+  }
+  if (!files.certificate.empty()) {
+    TF_ASSIGN_OR_RETURN(contents.certificate, ReadPemFile(files.certificate));
+    TF_ASSIGN_OR_RETURN(contents.key, ReadSecretPemFile(files.key));
+  }
+  return contents;
+}
+
+absl::StatusOr<std::chrono::system_clock::time_point> CheckTlsContents(
+    const TlsFiles& files, const TlsContents& contents) {
+  if (!files.authorities.empty()) {
+    TF_RETURN_IF_ERROR(WithFile(CheckAuthorities(contents.authorities), files.authorities));
+  }
+  if (files.certificate.empty()) return std::chrono::system_clock::time_point();
+  const absl::StatusOr<CertificateFacts> facts =
+      CheckIdentity(contents.certificate, contents.key, std::chrono::system_clock::now());
+  if (!facts.ok()) return WithFile(facts.status(), files.certificate);
+  return facts->not_after;
 }
 
 }  // namespace tissueform

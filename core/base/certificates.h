@@ -43,4 +43,28 @@ absl::StatusOr<CertificateFacts> CheckIdentity(absl::string_view chain_pem,
 // Certificates by which others are judged. Errors: InvalidArgument (none, or one that is no PEM).
 absl::Status CheckAuthorities(absl::string_view pem);
 
+// The PEM files by which the two sides of a TLS connection know each other; empty: not used.
+struct TlsFiles {
+  std::string certificate = {};  // a chain, the own one first
+  std::string key = {};          // that no other user may read
+  std::string authorities = {};  // which sign the peers' certificates
+};
+
+// What the files hold.
+struct TlsContents {
+  std::string certificate = {};
+  std::string key = {};
+  std::string authorities = {};
+  friend bool operator==(const TlsContents&, const TlsContents&) = default;
+};
+
+// Errors: InvalidArgument (a certificate without a key, or a key without a certificate); those of
+// ReadPemFile and ReadSecretPemFile.
+absl::StatusOr<TlsContents> ReadTlsFiles(const TlsFiles& files);
+
+// Checks what is there; the end of the own certificate, the epoch without one.
+// Errors: those of CheckAuthorities and CheckIdentity, with the file's path.
+absl::StatusOr<std::chrono::system_clock::time_point> CheckTlsContents(const TlsFiles& files,
+                                                                       const TlsContents& contents);
+
 }  // namespace tissueform

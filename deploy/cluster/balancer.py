@@ -25,7 +25,8 @@ def socket_path(cluster):
 
 def environment(cluster):
     """What deploy/haproxy/cluster.cfg reads."""
-    words = {"LISTEN": cluster.address("workstations"), "LISTEN_WEB": cluster.address("browsers"), "SOCKET": str(socket_path(cluster))}
+    words = {"LISTEN": cluster.address("workstations"), "LISTEN_WEB": cluster.address("browsers"),
+             "LISTEN_GATEWAYS": cluster.address("calls_of_gateways"), "SOCKET": str(socket_path(cluster))}
     for number, node in enumerate(cluster.places, 1):
         words |= {f"NODE_{number}": node, f"SERVER_{number}": cluster.address(node)}
     for number, gateway in enumerate(cluster.gateways, 1):

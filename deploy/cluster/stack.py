@@ -22,9 +22,10 @@ from free_ports import check_free, free_ports
 
 DATABASE, HAPROXY = "postgresql", balancer.NAME
 ROOT = processes.ROOT
-# Servers that there may be. HAProxy and the gateways know them all from the start, so that one is added by being started. As many
-# as a database of PostgreSQL's default of 100 connections takes.
+# Servers that there may be. HAProxy knows them all from the start, so that one is added by being started. As many as a database
+# of PostgreSQL's default of 100 connections takes.
 MOST_NODES = 5
+PORTS_OF_HAPROXY = ("workstations", "browsers", "calls_of_gateways")
 SETTINGS = {"nodes": 3, "gateways": 2, "cpus": [], "server_options": [], "server_environment": {}, "database_ports": {}}
 
 
@@ -90,7 +91,7 @@ class Cluster:
 
     def ports_of(self, name):
         """All on which the program of that name listens."""
-        return [self.port(each) for each in (("workstations", "browsers") if name == HAPROXY else (name,))]
+        return [self.port(each) for each in (PORTS_OF_HAPROXY if name == HAPROXY else (name,))]
 
     def address(self, name):
         return f"{processes.HOST}:{self.port(name)}"
@@ -108,7 +109,7 @@ class Cluster:
         make_folder(self.folder, "--state", mode=0o700)
         self.folder.chmod(0o700)
         self.state = {"settings": SETTINGS | settings, "processes": {}, "ports": {}}
-        listening = [*self.names, *self.places[len(self.nodes):], "workstations", "browsers"]
+        listening = [*self.names, *self.places[len(self.nodes):], *PORTS_OF_HAPROXY]
         self.state["ports"] = dict(zip(listening, free_ports(len(listening))))
         self.state["database"] = database.make(self.folder)
         self.save()
@@ -141,9 +142,9 @@ class Cluster:
         return max(256, machine_mib // 2 // self.state["settings"]["nodes"])
 
     def gateway_command(self, gateway):
-        servers = [word for node in self.places for word in ("--server", f"{node}={self.address(node)}")]
         web = ["--web", self.web] if self.web else []
-        return [self.programs / "tissueform-gateway", "--listen", self.address(gateway), *servers, *web,
+        return [self.programs / "tissueform-gateway", "--listen", self.address(gateway), "--server", self.address("calls_of_gateways"),
+                "--calls-per-channel", "1", "--channels-per-server", "2400", *web,
                 "--max-connections-per-address", "4096", "--trust-forwarded-from", processes.HOST]
 
     # Starting and ending

@@ -16,7 +16,6 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
-#include "core/base/certificates.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -40,10 +39,6 @@ bool WriteAll(int fd, const std::string& content) {
     done += static_cast<size_t>(written);
   }
   return true;
-}
-
-absl::Status WithFile(const absl::Status& status, const std::string& path) {
-  return {status.code(), absl::StrCat(path, ": ", status.message())};
 }
 
 }  // namespace
@@ -79,20 +74,17 @@ absl::Status PrivateFile::Replace(const std::string& content) {
   return status;
 }
 
-absl::StatusOr<std::unique_ptr<RotatedFiles>> RotatedFiles::Load(const Paths& paths) {
+absl::StatusOr<std::unique_ptr<RotatedFiles>> RotatedFiles::Load(const TlsFiles& paths) {
   using grpc::experimental::FileWatcherCertificateProvider;
-  if (paths.certificate.empty() != paths.key.empty()) {
-    return absl::InvalidArgumentError("give both certificate and key");
-  }
   auto files = absl::WrapUnique(new RotatedFiles(paths));
-  TF_ASSIGN_OR_RETURN(const Contents contents, files->Read());
-  TF_ASSIGN_OR_RETURN(files->expiry_, files->Check(contents));
+  TF_ASSIGN_OR_RETURN(const TlsContents contents, ReadTlsFiles(paths));
+  TF_ASSIGN_OR_RETURN(files->expiry_, CheckTlsContents(paths, contents));
   if (!paths.certificate.empty()) {
     TF_ASSIGN_OR_RETURN(files->identity_,
                         PrivateFile::Make(absl::StrCat(contents.certificate, "\n", contents.key)));
   }
-  if (!paths.roots.empty()) {
-    TF_ASSIGN_OR_RETURN(files->roots_, PrivateFile::Make(contents.roots));
+  if (!paths.authorities.empty()) {
+    TF_ASSIGN_OR_RETURN(files->roots_, PrivateFile::Make(contents.authorities));
   }
   const std::string identity = files->has_identity() ? files->identity_->path() : "";
   const std::string roots = files->has_roots() ? files->roots_->path() : "";
@@ -112,36 +104,10 @@ RotatedFiles::~RotatedFiles() {
   if (thread_.joinable()) thread_.join();
 }
 
-absl::StatusOr<RotatedFiles::Contents> RotatedFiles::Read() const {
-  Contents contents;
-  if (!paths_.certificate.empty()) {
-    TF_ASSIGN_OR_RETURN(contents.certificate, ReadPemFile(paths_.certificate));
-    TF_ASSIGN_OR_RETURN(contents.key, ReadSecretPemFile(paths_.key));
-  }
-  if (!paths_.roots.empty()) {
-    TF_ASSIGN_OR_RETURN(contents.roots, ReadPemFile(paths_.roots));
-  }
-  return contents;
-}
-
-absl::StatusOr<std::chrono::system_clock::time_point> RotatedFiles::Check(
-    const Contents& contents) const {
-  if (!paths_.roots.empty()) {
-    if (const absl::Status status = CheckAuthorities(contents.roots); !status.ok()) {
-      return WithFile(status, paths_.roots);
-    }
-  }
-  if (paths_.certificate.empty()) return std::chrono::system_clock::time_point();
-  const absl::StatusOr<CertificateFacts> facts =
-      CheckIdentity(contents.certificate, contents.key, std::chrono::system_clock::now());
-  if (!facts.ok()) return WithFile(facts.status(), paths_.certificate);
-  return facts->not_after;
-}
-
 absl::Status RotatedFiles::LookAgain() {
-  TF_ASSIGN_OR_RETURN(const Contents contents, Read());
+  TF_ASSIGN_OR_RETURN(const TlsContents contents, ReadTlsFiles(paths_));
   if (contents == used_) return absl::OkStatus();
-  TF_ASSIGN_OR_RETURN(const auto expiry, Check(contents));
+  TF_ASSIGN_OR_RETURN(const auto expiry, CheckTlsContents(paths_, contents));
   TF_RETURN_IF_ERROR(Use(contents));
   expiry_ = expiry;
   ++rotations_;
@@ -149,12 +115,12 @@ absl::Status RotatedFiles::LookAgain() {
   return absl::OkStatus();
 }
 
-absl::Status RotatedFiles::Use(const Contents& contents) {
+absl::Status RotatedFiles::Use(const TlsContents& contents) {
   if (identity_ != nullptr) {
     TF_RETURN_IF_ERROR(identity_->Replace(absl::StrCat(contents.certificate, "\n", contents.key)));
   }
   if (roots_ != nullptr) {
-    TF_RETURN_IF_ERROR(roots_->Replace(contents.roots));
+    TF_RETURN_IF_ERROR(roots_->Replace(contents.authorities));
   }
   used_ = contents;
   return absl::OkStatus();

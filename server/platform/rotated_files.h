@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "grpcpp/security/tls_certificate_provider.h"
 
+#include "core/base/certificates.h"
 #include "core/base/mutex.h"
 
 namespace tissueform {
@@ -43,18 +44,11 @@ class PrivateFile {
 // Thread-safe.
 class RotatedFiles {
  public:
-  // PEM files. Certificate and key both or none; of roots and them at least one.
-  struct Paths {
-    std::string certificate = {};  // the chain, the own one first
-    std::string key = {};
-    std::string roots = {};  // by which others are judged
-  };
-
   // Reads and checks all of them, and looks every second whether they have changed until it is
   // destroyed. What is no good then is told in the log, counted, and not used.
   //
-  // Errors: InvalidArgument, NotFound, FailedPrecondition, with the file and what to do.
-  static absl::StatusOr<std::unique_ptr<RotatedFiles>> Load(const Paths& paths);
+  // Errors: those of ReadTlsFiles and CheckTlsContents. REQUIRES: at least one file is named.
+  static absl::StatusOr<std::unique_ptr<RotatedFiles>> Load(const TlsFiles& paths);
   ~RotatedFiles();
 
   // Must not be asked for anything new when this is gone: end servers and channels first.
@@ -72,18 +66,9 @@ class RotatedFiles {
   int rotations() const { return rotations_; }
 
  private:
-  struct Contents {
-    std::string certificate = {};
-    std::string key = {};
-    std::string roots = {};
-    friend bool operator==(const Contents&, const Contents&) = default;
-  };
+  explicit RotatedFiles(TlsFiles paths) : paths_(std::move(paths)) {}
 
-  explicit RotatedFiles(Paths paths) : paths_(std::move(paths)) {}
-
-  absl::StatusOr<Contents> Read() const;
-  absl::StatusOr<std::chrono::system_clock::time_point> Check(const Contents& contents) const;
-  absl::Status Use(const Contents& contents);
+  absl::Status Use(const TlsContents& contents);
   void Watch();
   // Once a day when the certificate ends soon.
   void TellOfExpiry();
@@ -91,7 +76,7 @@ class RotatedFiles {
   absl::Status LookAgain();
 
   // Constant after Load.
-  const Paths paths_;
+  const TlsFiles paths_;
   std::unique_ptr<PrivateFile>
       identity_;  // chain and key together: no reader sees half of a change
   std::unique_ptr<PrivateFile> roots_;
@@ -103,7 +88,7 @@ class RotatedFiles {
   std::atomic<int> rotations_ = 0;
 
   // The thread's.
-  Contents used_;
+  TlsContents used_;
   std::chrono::system_clock::time_point told_of_expiry_ = {};
 
   Mutex mutex_;

@@ -10,7 +10,7 @@ namespace tissueform {
 absl::StatusOr<std::unique_ptr<RotatedFiles>> LoadServerFiles(const TlsOptions& options) {
   if (!options.enabled()) return nullptr;
   return RotatedFiles::Load(
-      {.certificate = options.certificate, .key = options.key, .roots = options.client_ca});
+      {.certificate = options.certificate, .key = options.key, .authorities = options.client_ca});
 }
 
 std::shared_ptr<grpc::ServerCredentials> MakeServerCredentials(const TlsOptions& options,

@@ -8,21 +8,29 @@
 #include "server/platform/network_address.h"
 
 namespace tissueform {
+
+CLI::Option* AddPemOption(CLI::App& app, const PemOption& file) {
+  return app.add_option(file.name, *file.path, file.help)->type_name("FILE");
+}
+
+CLI::Option* AddIdentityOptions(CLI::App& app, const PemOption& certificate, const PemOption& key) {
+  CLI::Option* const certificate_option = AddPemOption(app, certificate);
+  CLI::Option* const key_option = AddPemOption(app, key)->needs(certificate_option);
+  return certificate_option->needs(key_option);
+}
+
 void AddTlsOptions(CLI::App& app, TlsOptions* options) {
-  CLI::Option* certificate =
-      app.add_option("--tls-cert", options->certificate,
-                     "certificate chain of the server in PEM, its own first; enables encryption. "
-                     "Rewrite the file to renew it")
-          ->type_name("FILE");
-  CLI::Option* key =
-      app.add_option("--tls-key", options->key, "its key in PEM, not readable by other users")
-          ->type_name("FILE")
+  CLI::Option* const certificate = AddIdentityOptions(
+      app,
+      {"--tls-cert",
+       "certificate chain of the server in PEM, its own first; enables encryption. Rewrite the "
+       "file to renew it",
+       &options->certificate},
+      {"--tls-key", "its key in PEM, not readable by other users", &options->key});
+  CLI::Option* const client_ca =
+      AddPemOption(app, {"--tls-client-ca", "authorities of client certificates, in PEM",
+                         &options->client_ca})
           ->needs(certificate);
-  certificate->needs(key);
-  CLI::Option* client_ca = app.add_option("--tls-client-ca", options->client_ca,
-                                          "authorities of client certificates, in PEM")
-                               ->type_name("FILE")
-                               ->needs(certificate);
   app.add_option_function<std::string>(
          "--tls-client-auth",
          [options](const std::string& word) {

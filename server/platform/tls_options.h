@@ -24,6 +24,20 @@ struct TlsOptions {
   bool enabled() const { return !certificate.empty(); }
 };
 
+// The option of a PEM file; `path` must outlive the parsing.
+struct PemOption {
+  std::string name;
+  std::string help;
+  std::string* path;
+};
+
+// Adds the options of a certificate and of its key, which must be given together; returns the
+// first.
+CLI::Option* AddIdentityOptions(CLI::App& app, const PemOption& certificate, const PemOption& key);
+
+// Adds the option of a PEM file.
+CLI::Option* AddPemOption(CLI::App& app, const PemOption& file);
+
 // `options` must outlive the parsing.
 void AddTlsOptions(CLI::App& app, TlsOptions* options);
 

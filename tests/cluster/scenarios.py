@@ -14,8 +14,7 @@ MARGIN_S = 1  # a server answers until so long before its lease ends
 RENEWAL_S = 3
 BEYOND_LEASE_S = arena_module.LEASE_S + 3
 CUT_OFF_S = 4  # a server without the database says so when its leases have ended, and proxies see it, so long after that
-PINGS_S = 22  # a gateway knows by then that a server is silent
-FOUND_AGAIN_S = 8  # and that it is there again, gateways and proxies
+FOUND_AGAIN_S = 8  # proxies know by then that a server is there again
 LATE_S = 2  # for what was stopped to show what it does when it goes on
 
 
@@ -93,22 +92,20 @@ class Scenarios:
         return max(self.load.rivals, key=lambda rival: rival.last_frame[0] if rival.last_frame else 0)
 
     def _freeze(self, process, what, held, late_s):
-        """Stops a process. Whoever drags through a gateway hears of a silent server by the gateway's pings alone."""
-        page = held & {self.load.page.session}
         stack.processes.send(process, signal.SIGSTOP)
-        return [self.arena.note(what, held - page, seen_after_s=late_s), self.arena.note(what, page, seen_after_s=max(late_s, PINGS_S))]
+        return self.arena.note(what, held, seen_after_s=late_s)
 
     def stop_and_split(self, stop=True, split=True):
         contested, rival = self.load.contested, self._contested_owner()
         epoch = self.arena.epoch_of(contested)
         process, frozen, events = self.arena.process_at(rival.address), [], []
         if stop:
-            events += self._freeze(process, f"SIGSTOP {self.arena.name_at(rival.address)}", self.arena.held_by(rival.pinned), 0)
+            events.append(self._freeze(process, f"SIGSTOP {self.arena.name_at(rival.address)}", self.arena.held_by(rival.pinned), 0))
         if split:
             # Not one that is stopped; alone, the owner itself.
             node = next(name for name in self.arena.cluster.nodes if (name != rival.pinned) == stop)
             frozen.append(self.arena.links[node])
-            events += self._freeze(frozen[0], f"database cut off from {node}", self.arena.held_by(node), CUT_OFF_S)
+            events.append(self._freeze(frozen[0], f"database cut off from {node}", self.arena.held_by(node), CUT_OFF_S))
         self.say(", ".join(sorted({event.what for event in events})) + f"; {self.arena.name_at(rival.address)} holds the contested session under epoch {epoch}")
         time.sleep(BEYOND_LEASE_S)
         if stop:

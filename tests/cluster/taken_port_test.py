@@ -25,7 +25,7 @@ class TakenPortTest(unittest.TestCase):
 
     def cluster(self, folder, **ports):
         cluster = stack.Cluster(folder, folder)
-        names = ["postgresql", "node1", "gateway1", "workstations", "browsers"]
+        names = ["postgresql", "node1", "gateway1", *stack.PORTS_OF_HAPROXY]
         cluster.state = {"settings": stack.SETTINGS | {"nodes": 1, "gateways": 1}, "processes": {}, "database": {},
                          "ports": dict(zip(names, free_ports(len(names)))) | ports}
         return cluster

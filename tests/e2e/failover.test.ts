@@ -1,12 +1,14 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { Front, freeAddress, hasHaproxy } from "./front";
 import { Planner, Program, type Hook, live, openCase, openPage, startGateway, state, takeSegment, typeMove } from "./planner";
 
-// Two servers of a cluster, the one that holds the drag killed or drained; two gateways behind HAProxy, the page's own killed.
+// Two servers of a cluster behind HAProxy, the one that holds the drag killed or drained; two gateways, the page's own killed.
 // PostgreSQL is that of pg_virtualenv:
 //
 //   pg_virtualenv -t npm --prefix client/web run test:e2e -- failover.test.ts
@@ -21,7 +23,9 @@ const NODES = ["left", "right"];
 
 class Cluster {
   private readonly servers = new Map<string, Program>();
-  private front: Front | null = null;
+  private front!: Front;
+  private readonly folder = mkdtempSync(join(tmpdir(), "tissueform-front-"));
+  private readonly places: string[] = [];
   private readonly gateways: Program[] = [];
   planner!: Planner;
 
@@ -29,24 +33,27 @@ class Cluster {
     const cluster = new Cluster();
     // One after the other: the first makes the tables.
     for (const node of NODES) await cluster.startNode(node);
-    cluster.planner = await Planner.start(undefined, { servers: cluster.named });
+    cluster.places.push(await freeAddress(), await freeAddress());
+    const addresses = new Map([...cluster.servers].map(([node, { address }]) => [node, address]));
+    cluster.front = await Front.start(cluster.folder, addresses, cluster.places);
+    await cluster.front.has(NODES.length, "servers");
+    cluster.planner = await Planner.start(undefined, { calls: cluster.front.calls });
     return cluster;
   }
 
-  private get named(): string[] {
-    return NODES.map((node) => `${node}=${this.servers.get(node)?.address}`);
+  /** Where pages come from when their gateway is one of HAProxy's. */
+  get url(): string {
+    return this.front.url;
   }
 
-  /** HAProxy before two gateways, of which the first alone is there yet; where pages come from. `next` starts the other one. */
-  async startFront(): Promise<{ url: string; next(): Promise<void>; killFirst(): Promise<void> }> {
-    const addresses = [await freeAddress(), await freeAddress()];
-    const front = (this.front = await Front.start(this.planner.folder, addresses));
-    const next = async () => {
-      this.gateways.push(await startGateway(this.named, addresses[this.gateways.length]));
-      await front.hasGateways(this.gateways.length);
-    };
-    await next();
-    return { url: front.url, next, killFirst: () => this.gateways[0].stop("SIGKILL") };
+  /** One of HAProxy's gateways more, of two. */
+  async nextGateway(): Promise<void> {
+    this.gateways.push(await startGateway(this.front.calls, this.places[this.gateways.length]));
+    await this.front.has(this.gateways.length, "gateways");
+  }
+
+  killFirstGateway(): Promise<void> {
+    return this.gateways[0].stop("SIGKILL");
   }
 
   /** At the same address as before. */
@@ -62,7 +69,8 @@ class Cluster {
   }
 
   async stop(): Promise<void> {
-    await this.front?.stop();
+    await this.front.stop();
+    rmSync(this.folder, { recursive: true, force: true });
     for (const gateway of this.gateways) await gateway.stop("SIGKILL");
     await this.planner?.stop();
     for (const server of this.servers.values()) await server.stop("SIGKILL");
@@ -231,13 +239,13 @@ describe.skipIf(PGPORT === undefined || !hasHaproxy)("a drag in a cluster", () =
   });
 
   test("whose gateway is killed goes on through the other one, with the newest pose", async () => {
-    const { url, next, killFirst } = await cluster.startFront();
-    const { page, faults } = await openCase(opened.page.context(), { url, casePath: cluster.planner.casePath });
-    await next();
+    await cluster.nextGateway();
+    const { page, faults } = await openCase(opened.page.context(), { url: cluster.url, casePath: cluster.planner.casePath });
+    await cluster.nextGateway();
     await listen(page);
     await moveOn(page);
     await goesOn(page, 5);
-    await killFirst();
+    await cluster.killFirstGateway();
     await page.waitForFunction(() => (globalThis as any).heard.includes("moving"));
     await live(page);
     await goesOn(page, 5);

@@ -23,30 +23,37 @@ export async function freeAddress(): Promise<string> {
   return `127.0.0.1:${port}`;
 }
 
-/** deploy/haproxy/cluster.cfg as it stands, before gateways; what browsers see of a cluster. */
+/** deploy/haproxy/cluster.cfg as it stands, before servers and gateways: what browsers see of a cluster, and where gateways call. */
 export class Front {
   private constructor(
     private readonly child: ChildProcess,
     private readonly socket: string,
     readonly url: string,
+    readonly calls: string,
   ) {}
 
-  /** Before gateways at these addresses, which may come later; `folder`: for its runtime socket. */
-  static async start(folder: string, gateways: string[]): Promise<Front> {
-    const [listen, web] = [await freeAddress(), await freeAddress()];
+  /** Before servers and gateways at these addresses, which may come later; `folder`: for its runtime socket. */
+  static async start(folder: string, servers: Map<string, string>, gateways: string[]): Promise<Front> {
+    const [listen, web, calls] = [await freeAddress(), await freeAddress(), await freeAddress()];
     const socket = join(folder, "haproxy.sock");
+    const nodes = [...servers].flatMap(([name, address], index) => [
+      [`TISSUEFORM_NODE_${index + 1}`, name],
+      [`TISSUEFORM_SERVER_${index + 1}`, address],
+    ]);
     const named = gateways.map((address, index) => [`TISSUEFORM_GATEWAY_${index + 1}`, address]);
-    const variables = { TISSUEFORM_LISTEN: listen, TISSUEFORM_LISTEN_WEB: web, TISSUEFORM_SOCKET: socket, ...Object.fromEntries(named) };
+    const places = { TISSUEFORM_LISTEN: listen, TISSUEFORM_LISTEN_WEB: web, TISSUEFORM_LISTEN_GATEWAYS: calls, TISSUEFORM_SOCKET: socket };
+    const variables = { ...places, ...Object.fromEntries([...nodes, ...named]) };
     const child = spawn(HAPROXY ?? "haproxy", ["-db", "-f", CONFIGURATION], { stdio: "ignore", env: { ...process.env, ...variables } });
-    return new Front(child, socket, `http://${web}`);
+    return new Front(child, socket, `http://${web}`, calls);
   }
 
-  /** Until it sends pages to so many gateways. */
-  async hasGateways(count: number): Promise<void> {
+  /** Until it sends calls to so many servers, or pages to so many gateways. */
+  async has(count: number, what: "servers" | "gateways"): Promise<void> {
     const end = Date.now() + START_MS;
+    const up = new RegExp(`^${what},(?!BACKEND).*,UP,`, "gm");
     let told = "";
-    while ((told.match(/^gateways,gateway\d+,.*,UP,/gm) ?? []).length !== count) {
-      if (Date.now() > end) throw new Error(`HAProxy does not see ${count} gateways: ${told}`);
+    while ((told.match(up) ?? []).length !== count) {
+      if (Date.now() > end) throw new Error(`HAProxy does not see ${count} ${what}: ${told}`);
       await new Promise((done) => setTimeout(done, ASK_AGAIN_MS));
       told = await this.ask("show stat");
     }

@@ -76,10 +76,9 @@ export function startCommand(options: string[]): { said(text: string): Promise<s
   return { said, ended: () => ended };
 }
 
-/** A gateway with the planner before these servers. */
-export function startGateway(servers: string[], listen: string, options: string[] = []): Promise<Program> {
-  const named = servers.flatMap((server) => ["--server", server]);
-  return Program.start("tissueform-gateway", [...named, "--listen", listen, "--web", WEB, "--drain-seconds", "1", ...options]);
+/** A gateway with the planner before this server, or HAProxy. */
+export function startGateway(server: string, listen: string, options: string[] = []): Promise<Program> {
+  return Program.start("tissueform-gateway", ["--server", server, "--listen", listen, "--web", WEB, "--drain-seconds", "1", ...options]);
 }
 
 /** Server and gateway with a case of the bundled head, and a browser. */
@@ -94,15 +93,15 @@ export class Planner {
 
   /**
    * `casePath`: of a case; left out: one of the bundled head with three segments, without the surfaces that surround it.
-   * `options`: more of the programs; `servers`: those of the gateway, in place of one of its own.
+   * `options`: more of the programs; `calls`: where the gateway sends calls, in place of a server of its own.
    */
-  static async start(casePath?: string, options: { gateway?: string[]; server?: string[]; servers?: string[] } = {}): Promise<Planner> {
+  static async start(casePath?: string, options: { gateway?: string[]; server?: string[]; calls?: string } = {}): Promise<Planner> {
     const planner = new Planner(options.server ?? []);
     chmodSync(planner.folder, 0o700);
     if (casePath !== undefined) planner.casePath = casePath;
     else execFileSync(join(BIN, "tissueform"), ["case", "pack", planner.writePlan(false), "--out", planner.casePath]);
-    if (options.servers === undefined) await planner.startServer();
-    planner.gateway = await startGateway(options.servers ?? [planner.serverAddress], "127.0.0.1:0", options.gateway);
+    if (options.calls === undefined) await planner.startServer();
+    planner.gateway = await startGateway(options.calls ?? planner.serverAddress, "127.0.0.1:0", options.gateway);
     return planner;
   }
 

@@ -28,7 +28,7 @@ constexpr absl::string_view kHandshake =
 Gateway& AloneGateway() {
   static Gateway* const gateway = [] {
     GatewayOptions options;
-    options.servers = {"unix:/nonexistent/tissueform.sock"};
+    options.server = "unix:/nonexistent/tissueform.sock";
     options.port = 0;
     options.limits.message_bytes = 4096;
     auto started = Gateway::Start(options);

@@ -5,12 +5,15 @@
 
   behind_cluster_haproxy.py TISSUEFORM_SERVER CONFIGURATION
 
-Three small servers that say their names stand for a cluster, and a tissueform-server for what health says. A line for each
+Three small servers that say their names stand for a cluster, and a tissueform-server for what health says; also through the
+tissueform-gateway beside it. A line for each
 property that holds; exit code 1 with what does not, 77 when haproxy or a Python module is missing.
 """
 
 import collections
+import http.client
 import os
+import pathlib
 import shutil
 import signal
 import socket
@@ -28,16 +31,21 @@ except ImportError:
     sys.exit(77)
 
 PATIENCE_S = 30
-SESSION, NODE = "x-tissueform-session", "x-tissueform-node"
+SESSION, NODE, ADDRESS = "x-tissueform-session", "x-tissueform-node", "x-tissueform-client-address"
+SHORT, ENDLESS = "/tissueform.v1.MeshService/GetMesh", "/tissueform.v1.CaseService/ReadCase"  # that the gateway serves
 SERVING, NOT_SERVING = b"\x08\x01", b"\x08\x02"
 CROWD = 5
 
 
+ENDLESS_BYTES = 200_000
+STALLED_S = 2
+
+
 class Node(grpc.GenericRpcHandler):
-    """A server of a cluster: its name is every answer, and a call for another one is refused."""
+    """A server of a cluster: its name is every answer, and a call for another one is refused. Whom it was last called for."""
 
     def __init__(self, name):
-        self.name, self.health, self.port = name, SERVING, 0
+        self.name, self.health, self.port, self.called_for = name, SERVING, 0, None
         self.start()
 
     def start(self):
@@ -51,6 +59,8 @@ class Node(grpc.GenericRpcHandler):
             return grpc.unary_unary_rpc_method_handler(lambda request, context: self.health)
         if details.method == "/test.Test/Stream":
             return grpc.stream_stream_rpc_method_handler(self.answer_each)
+        if details.method == ENDLESS:
+            return grpc.unary_stream_rpc_method_handler(self.answer_without_end)
         return grpc.unary_unary_rpc_method_handler(self.answer)
 
     def check(self, context):
@@ -60,7 +70,14 @@ class Node(grpc.GenericRpcHandler):
 
     def answer(self, request, context):
         self.check(context)
+        self.called_for = dict(context.invocation_metadata()).get(ADDRESS)
+        context.send_initial_metadata(((NODE, self.name),))
         return self.name.encode()
+
+    def answer_without_end(self, request, context):
+        self.check(context)
+        while context.is_active():
+            yield bytes(ENDLESS_BYTES)
 
     def answer_each(self, requests, context):
         self.check(context)
@@ -74,18 +91,18 @@ class Haproxy:
     def __init__(self, configuration, folder, servers):
         self.socket = f"{folder}/haproxy.sock"
         listener = socket.create_server(("127.0.0.1", 0))
-        web = socket.create_server(("127.0.0.1", 0))
-        for each in (listener, web):
+        web, calls = socket.create_server(("127.0.0.1", 0)), socket.create_server(("127.0.0.1", 0))
+        for each in (listener, web, calls):
             os.set_inheritable(each.fileno(), True)
-        self.port = listener.getsockname()[1]
+        self.port, self.port_of_gateways = listener.getsockname()[1], calls.getsockname()[1]
         environment = os.environ | {"TISSUEFORM_LISTEN": f"fd@{listener.fileno()}", "TISSUEFORM_LISTEN_WEB": f"fd@{web.fileno()}",
-                                    "TISSUEFORM_SOCKET": self.socket}
+                                    "TISSUEFORM_LISTEN_GATEWAYS": f"fd@{calls.fileno()}", "TISSUEFORM_SOCKET": self.socket}
         for number, (name, port) in enumerate(servers, 1):
             environment |= {f"TISSUEFORM_NODE_{number}": name, f"TISSUEFORM_SERVER_{number}": f"127.0.0.1:{port}"}
         self.process = subprocess.Popen([shutil.which("haproxy", path="/usr/sbin:/usr/bin"), "-db", "-f", configuration],
                                         env=environment, close_fds=False, stderr=subprocess.DEVNULL)
-        listener.close()
-        web.close()
+        for each in (listener, web, calls):
+            each.close()
         self.channel = grpc.insecure_channel(f"127.0.0.1:{self.port}")
         self.unary = self.channel.unary_unary("/test.Test/Call")
         self.stream = self.channel.stream_stream("/test.Test/Stream")
@@ -112,6 +129,35 @@ class Haproxy:
 
     def stop(self):
         self.channel.close()
+        self.process.terminate()
+        self.process.wait(PATIENCE_S)
+
+
+class Gateway:
+    """A gateway before HAProxy, as docs/gateway.md has it."""
+
+    def __init__(self, program, haproxy):
+        self.process = subprocess.Popen([program, "--server", f"127.0.0.1:{haproxy.port_of_gateways}", "--listen", "127.0.0.1:0", "--trust-forwarded-from", "127.0.0.1",
+                                         "--calls-per-channel", "1", "--channels-per-server", "100", "--log-level", "off"], stdout=subprocess.PIPE, text=True)
+        self.port = int(self.process.stdout.readline().rpartition(":")[2])
+
+    def post(self, path, headers):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        connection.request("POST", path, bytes(5), {"content-type": "application/grpc-web+proto", **headers})
+        return connection.getresponse()
+
+    def ask(self, **headers):
+        """Which node answers, by the reply's header; None: none of them."""
+        with self.post(SHORT, {key.replace("_", "-"): value for key, value in headers.items()}) as response:
+            response.read()
+            return response.getheader(NODE)
+
+    def is_ready(self):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        connection.request("GET", "/readyz")
+        return connection.getresponse().status == 200
+
+    def stop(self):
         self.process.terminate()
         self.process.wait(PATIENCE_S)
 
@@ -212,6 +258,50 @@ def check_drain(haproxy, nodes):
     haproxy.tell(f"set server servers/{node.name} state ready")
 
 
+def check_gateway(program, haproxy, nodes):
+    """What pages have of a gateway, though it has one address."""
+    gateway = Gateway(program, haproxy)
+    try:
+        until(gateway.is_ready)
+        for node in nodes:
+            expect({gateway.ask(x_tissueform_node=node.name, x_tissueform_session=str(i)) for i in range(8)} == {node.name}, f"through a gateway, too, {node.name} goes to it alone")
+        expect(gateway.ask(x_tissueform_node="nobody") is None, "and a forged header to none")
+        keys = [f"page-{i}" for i in range(40)]
+        # Once a server that has come back has its weight.
+        until(lambda: set(ask_all(haproxy, keys).values()) == {node.name for node in nodes})
+        until(lambda: {key: gateway.ask(x_tissueform_session=key) for key in keys} == ask_all(haproxy, keys))
+        expect(True, "pages and workstations find a session at one server")
+        check_addresses(gateway, haproxy, nodes[0])
+        check_stalled(gateway, nodes[0])
+        nodes[0].health = NOT_SERVING
+        haproxy.wait(nodes[0].name, "NOLB")
+        expect(all(gateway.is_ready() or time.sleep(0.1) for _ in range(20)), "a gateway stays ready while one of its servers drains")
+        nodes[0].health = SERVING
+        haproxy.wait(nodes[0].name, "UP")
+    finally:
+        gateway.stop()
+
+
+def check_addresses(gateway, haproxy, node):
+    gateway.ask(x_tissueform_node=node.name, x_forwarded_for="203.0.113.9")
+    expect(node.called_for == "203.0.113.9", "servers hear the address that a gateway states")
+    haproxy.unary(b"", metadata=[(NODE, node.name), (ADDRESS, "203.0.113.9")], timeout=PATIENCE_S)
+    expect(node.called_for == "127.0.0.1", "and not what a workstation states")
+
+
+def check_stalled(gateway, node):
+    """A page that takes nothing stops no other one: HAProxy stops the whole connection, so each call has its own."""
+    stalled = [gateway.post(ENDLESS, {NODE: node.name}) for _ in range(3)]
+    for response in stalled:
+        response.read(1)
+    time.sleep(STALLED_S)
+    start = time.monotonic()
+    answers = {gateway.ask(x_tissueform_node=node.name) for _ in range(20)}
+    expect(answers == {node.name} and time.monotonic() - start < STALLED_S, "a page that reads nothing holds up no other")
+    for response in stalled:
+        response.close()
+
+
 def check_added(haproxy, node):
     server = f"servers/{node.name}"
     haproxy.tell(f"add server {server} 127.0.0.1:{node.port} id 9 proto h2 check inter 500ms fastinter 200ms fall 2 rise 1;"
@@ -277,6 +367,7 @@ def main():
             check_header(haproxy, nodes)
             check_death(haproxy, nodes, first)
             check_drain(haproxy, nodes)
+            check_gateway(pathlib.Path(program).with_name("tissueform-gateway"), haproxy, nodes)
             check_added(haproxy, Node("added:1"))
             check_half_open(haproxy)
             check_nobody(haproxy)

@@ -67,24 +67,6 @@ TEST_F(CasesTest, ACaseOfManyChunksIsGivenOutAsItCame) {
   EXPECT_TRUE(read == bytes);
 }
 
-TEST_F(CasesTest, CasesAreListedInOrderAndDeleted) {
-  std::vector<std::string> names;
-  for (uint32_t seed = 1; seed <= 3; ++seed) {
-    ASSERT_OK_AND_ASSIGN(const v1::Case made, calls().Upload(CaseOf(100, seed), ""));
-    names.push_back(made.name());
-  }
-  std::sort(names.begin(), names.end());
-  ASSERT_OK_AND_ASSIGN(std::vector<v1::Case> listed, calls().List());
-  ASSERT_EQ(listed.size(), 3U);
-  for (size_t i = 0; i < 3; ++i) EXPECT_EQ(listed[i].name(), names[i]);
-  ASSERT_THAT(calls().Delete(names[1]), IsOk());
-  ASSERT_OK_AND_ASSIGN(listed, calls().List());
-  EXPECT_EQ(listed.size(), 2U);
-  EXPECT_THAT(calls().Get(names[1]), Because(ErrorReason::kCaseNotFound));
-  EXPECT_THAT(calls().Read(names[1]), Because(ErrorReason::kCaseNotFound));
-  EXPECT_THAT(calls().Delete(names[1]), Because(ErrorReason::kCaseNotFound));
-}
-
 TEST_F(CasesTest, TheLimitsAreKeptAndTold) {
   ServerOptions options = TestOptions();
   options.limits.max_cases = 1;

@@ -1,7 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <thread>
@@ -21,7 +20,6 @@
 namespace tissueform::testing {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -155,40 +153,6 @@ TEST_F(PredictionsTest, ACaseOrTitleThatIsNoneIsRefused) {
   EXPECT_THAT(calls().List("", "cases/none"), StatusIs(absl::StatusCode::kInvalidArgument));
   ASSERT_OK_AND_ASSIGN(const auto all, calls().List());
   EXPECT_THAT(all, IsEmpty());
-}
-
-TEST_F(PredictionsTest, ListsAllOrThoseOfASession) {
-  const BarProblem other(8);
-  ASSERT_OK_AND_ASSIGN(const v1::Prediction theirs, PredictOf(other));
-  std::vector<std::string> ours;
-  for (int pose = 0; pose < 3; ++pose) {
-    ASSERT_OK_AND_ASSIGN(const v1::Prediction made, Predict(pose));
-    ours.push_back(made.name());
-  }
-  ASSERT_OK_AND_ASSIGN(std::vector<v1::Prediction> listed, calls().List(session_.name()));
-  std::vector<std::string> names;
-  names.reserve(listed.size());
-  for (const v1::Prediction& prediction : listed) names.push_back(prediction.name());
-  EXPECT_THAT(names, ::testing::UnorderedElementsAreArray(ours));
-  EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
-  ASSERT_OK_AND_ASSIGN(listed, calls().List(theirs.session()));
-  ASSERT_EQ(listed.size(), 1U);
-  EXPECT_EQ(listed[0].DebugString(), theirs.DebugString());
-  ASSERT_OK_AND_ASSIGN(listed, calls().List());
-  EXPECT_EQ(listed.size(), 4U);
-
-  const auto stub = v1::PredictionService::NewStub(OwnChannel());
-  v1::ListPredictionsRequest request;
-  request.set_page_size(3);
-  std::vector<int> sizes;
-  do {
-    grpc::ClientContext context;
-    v1::ListPredictionsResponse page;
-    ASSERT_TRUE(stub->ListPredictions(&context, request, &page).ok());
-    sizes.push_back(page.predictions_size());
-    request.set_page_token(page.next_page_token());
-  } while (!request.page_token().empty());
-  EXPECT_THAT(sizes, ElementsAre(3, 1));
 }
 
 TEST_F(PredictionsTest, ComparesTwoByTheDistancesOfTheirVertices) {

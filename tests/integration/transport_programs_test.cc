@@ -113,11 +113,11 @@ TEST_F(TransportProgramsTest, TheGatewaysCertificateDoesNotStandForItsUsers) {
   const TestFiles gateway_files =
       authority_.IssueFiles(folder_, "gateway", {.alternatives = "DNS:gateway.example.org"});
   GatewayOptions options;
-  options.servers = {absl::StrCat("localhost:", server().port())};
+  options.server = absl::StrCat("localhost:", server().port());
   options.port = 0;
   options.upstream = {.certificate = gateway_files.certificate,
                       .key = gateway_files.key,
-                      .roots = gateway_files.roots};
+                      .authorities = gateway_files.roots};
   ASSERT_OK_AND_ASSIGN(const auto gateway, Gateway::Start(options));
   ASSERT_TRUE(Eventually([&] { return gateway->pool().IsReady(); }));
   WriteTestFile(folder_ / "empty", std::string(5, '\0'));
@@ -137,10 +137,10 @@ TEST_F(TransportProgramsTest, AGatewayJudgesTheServersCertificate) {
   Serve();
   const TestFiles strange = TestAuthority("Another").IssueFiles(folder_, "strange");
   GatewayOptions options;
-  options.servers = {absl::StrCat("localhost:", server().port())};
+  options.server = absl::StrCat("localhost:", server().port());
   options.port = 0;
   options.upstream = {
-      .certificate = client_.certificate, .key = client_.key, .roots = strange.roots};
+      .certificate = client_.certificate, .key = client_.key, .authorities = strange.roots};
   ASSERT_OK_AND_ASSIGN(const auto gateway, Gateway::Start(options));
   WriteTestFile(folder_ / "empty", std::string(5, '\0'));
   ASSERT_EQ(Run(absl::StrCat("curl --silent --noproxy '*' --max-time 30 --include -H "
@@ -148,7 +148,7 @@ TEST_F(TransportProgramsTest, AGatewayJudgesTheServersCertificate) {
                              (folder_ / "empty").string(), " ", gateway->Url(), kListMeshes)),
             0);
   EXPECT_THAT(said_, HasSubstr("grpc-status: 14"));
-  options.servers = {"192.0.2.1:50051"};
+  options.server = "192.0.2.1:50051";
   options.upstream = {};
   EXPECT_THAT(Gateway::Start(options),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("--server-ca")));

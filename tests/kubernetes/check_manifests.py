@@ -89,9 +89,9 @@ BROKEN = {
     "a probe of a port that is none": (lambda o: first(o)["readinessProbe"]["grpc"].update(port=50054), "asks port 50054"),
     "a service of a port that is none": (lambda o: of_name(o, "Service", "tissueform")["spec"]["ports"][0].update(targetPort="web"), "no container has a port web"),
     "a policy for a port that is none": (lambda o: of_name(o, "NetworkPolicy", "server")["spec"]["ingress"][0]["ports"][0].update(port="http"), "has no port http"),
-    "a node more than they know": (lambda o: server_of(o)["spec"].update(replicas=9), "9 replicas, of which gateways and HAProxy know 8"),
-    "a node that gateways do not know": (lambda o: gateway_of(o)["args"].remove(f"--server={LAST_NODE}={LAST_NODE}.tissueform.svc.cluster.local:50051"),
-                                         "--server names other nodes"),
+    "a node more than they know": (lambda o: server_of(o)["spec"].update(replicas=9), "9 replicas, of which HAProxy knows 8"),
+    "a gateway past HAProxy": (lambda o: change(gateway_of(o)["args"], "--server=tissueform-calls.tissueform.svc.cluster.local:50054",
+                                               f"--server={LAST_NODE}.tissueform.svc.cluster.local:50051"), "--server is not the Service of HAProxy"),
     "a node that HAProxy does not know": (lambda o: of_name(o, "Deployment", "tissueform-haproxy")["spec"]["template"]["spec"]["containers"][0]["env"].remove(
         {"name": "TISSUEFORM_NODE_8", "value": LAST_NODE}), "it knows other nodes"),
     "a variable that HAProxy does not read": (lambda o: of_name(o, "Deployment", "tissueform-haproxy")["spec"]["template"]["spec"]["containers"][0]["env"].append(

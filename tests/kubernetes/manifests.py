@@ -150,16 +150,14 @@ def wrong_ports(objects):
 
 
 def unknown_servers(objects):
-    """Nodes that gateways, HAProxy or Services leave out of those that there are and may be: a node is added by `replicas` alone."""
+    """Nodes that HAProxy or Services leave out of those that there are and may be: a node is added by `replicas` alone."""
     server = next(each for each in workloads(objects) if each["kind"] == "StatefulSet")
     name, port = server["metadata"]["name"], arguments(pod(server)["containers"][0])["port"][0]
     wanted = {node: f"{node}.tissueform.svc.cluster.local:{port}" for node in (f"{name}-{i}" for i in range(MOST_NODES))}
     replicas = server["spec"]["replicas"]
     if isinstance(replicas, int) and replicas > MOST_NODES:
-        yield f"{name}: {replicas} replicas, of which gateways and HAProxy know {MOST_NODES}"
+        yield f"{name}: {replicas} replicas, of which HAProxy knows {MOST_NODES}"
     by_program = {container["command"][0]: container for _, container in containers(objects) if container["name"] != "health"}
-    if dict(value.split("=", 1) for value in arguments(by_program["tissueform-gateway"])["server"]) != wanted:
-        yield f"tissueform-gateway: --server names other nodes than {list(wanted)}"
     given = {each["name"]: each["value"] for each in by_program["haproxy"]["env"]}
     if {given[f"TISSUEFORM_NODE_{i}"]: given.get(f"TISSUEFORM_SERVER_{i}") for i in range(1, MOST_NODES + 1) if f"TISSUEFORM_NODE_{i}" in given} != wanted:
         yield f"tissueform-haproxy: it knows other nodes than {list(wanted)}"
@@ -171,6 +169,9 @@ def unknown_servers(objects):
         if (found := re.fullmatch(r"([a-z0-9-]+)\.tissueform\.svc\.cluster\.local(?::(\d+))?", each)) and (
                 found.group(1) not in services or int(found.group(2) or 50051) not in {port["port"] for port in services[found.group(1)]["ports"]}):
             yield f"tissueform-haproxy: there is no Service {each}"
+    calls = next((each for each in services.values() if any(port["name"] == "calls" for port in each["ports"])), {"ports": [{}]})
+    if arguments(by_program["tissueform-gateway"])["server"] != [f"tissueform-calls.tissueform.svc.cluster.local:{calls['ports'][0].get('port')}"]:
+        yield "tissueform-gateway: --server is not the Service of HAProxy for the calls of gateways"
     configuration = (FOLDER / "cluster.cfg").read_text()
     if configuration != (ROOT / "deploy/haproxy/cluster.cfg").read_text():
         yield "cluster.cfg: it is not deploy/haproxy/cluster.cfg"

@@ -117,7 +117,7 @@ struct DeviceLogin::Begun {
   seconds interval;
 };
 
-DeviceLogin::DeviceLogin(LoginClient client, HttpExchange exchange, Wait wait)
+DeviceLogin::DeviceLogin(LoginClient client, LoginExchange exchange, Wait wait)
     : client_(std::move(client)), exchange_(std::move(exchange)), wait_(std::move(wait)) {}
 
 HttpForm DeviceLogin::Form() const {
@@ -132,7 +132,7 @@ HttpForm DeviceLogin::Form() const {
 absl::StatusOr<DeviceLogin::Endpoints> DeviceLogin::Discover() {
   TF_RETURN_IF_ERROR(CheckLoginUrl("--issuer", client_.issuer));
   const absl::string_view slash = absl::EndsWith(client_.issuer, "/") ? "" : "/";
-  const HttpRequest request = {
+  const LoginRequest request = {
       .url = absl::StrCat(client_.issuer, slash, ".well-known/openid-configuration")};
   TF_ASSIGN_OR_RETURN(const HttpAnswer answer, exchange_(request));
   if (answer.status != 200) return NoAnswer(absl::StrCat("is status ", answer.status));

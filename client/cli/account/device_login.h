@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "client/cli/account/http_exchange.h"
+#include "client/cli/account/login_exchange.h"
 
 namespace tissueform {
 
@@ -41,7 +41,7 @@ class DeviceLogin {
  public:
   // `wait` is given the time between two questions.
   using Wait = std::function<void(std::chrono::seconds)>;
-  DeviceLogin(LoginClient client, HttpExchange exchange, Wait wait);
+  DeviceLogin(LoginClient client, LoginExchange exchange, Wait wait);
 
   // Shows the user the way by `prompt`, and waits until they have gone it.
   //
@@ -64,7 +64,7 @@ class DeviceLogin {
   HttpForm Form() const;
 
   const LoginClient client_;
-  const HttpExchange exchange_;
+  const LoginExchange exchange_;
   const Wait wait_;
 };
 

@@ -51,7 +51,7 @@ absl::StatusOr<std::string> PathOf(const LoginOptions& options) {
 }
 
 DeviceLogin LoginOf(LoginClient client) {
-  return DeviceLogin(std::move(client), CurlExchange(),
+  return DeviceLogin(std::move(client), &AskProvider,
                      [](std::chrono::seconds time) { std::this_thread::sleep_for(time); });
 }
 

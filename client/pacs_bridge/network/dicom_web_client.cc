@@ -118,7 +118,7 @@ class DicomWebClient : public PacsClient {
   absl::StatusOr<Json> Query(const std::string& path) {
     std::string text;
     TF_ASSIGN_OR_RETURN(
-        const PacsHttpAnswer answer,
+        const HttpAnswer answer,
         Exchange(peer_, {.path = path, .headers = {"Accept: application/dicom+json"}},
                  [&](const std::string& /*type*/, absl::string_view piece) -> absl::Status {
                    if (text.size() + piece.size() > kMaxJsonBytes) {
@@ -174,7 +174,7 @@ class DicomWebClient : public PacsClient {
                                        InstanceSink* sink) {
     IncomingInstances objects(peer_.name, folder, sink);
     TF_ASSIGN_OR_RETURN(
-        const PacsHttpAnswer answer,
+        const HttpAnswer answer,
         Exchange(peer_,
                  {.path = path,
                   .headers = {"Accept: multipart/related; type=\"application/dicom\"; "
@@ -197,7 +197,7 @@ class DicomWebClient : public PacsClient {
     body.append(std::istreambuf_iterator<char>(file), {});
     absl::StrAppend(&body, "\r\n--", boundary, "--\r\n");
     std::string text;
-    PacsHttpAnswer answer;
+    HttpAnswer answer;
     // Both are right (RFC 2046), but some servers know only the one or the other.
     for (const char* quote : {"\"", ""}) {
       TF_ASSIGN_OR_RETURN(answer, PostObject(body, absl::StrCat(quote, boundary, quote), &text));
@@ -210,8 +210,8 @@ class DicomWebClient : public PacsClient {
     return Confirmed(StatusOfStow(peer_.name, text, header.instance_uid, answer.status), header);
   }
 
-  absl::StatusOr<PacsHttpAnswer> PostObject(const std::string& body, const std::string& boundary,
-                                            std::string* text) {
+  absl::StatusOr<HttpAnswer> PostObject(const std::string& body, const std::string& boundary,
+                                        std::string* text) {
     return Exchange(peer_,
                     {.path = "/studies",
                      .headers = {absl::StrCat("Content-Type: multipart/related; "
@@ -241,7 +241,7 @@ class DicomWebClient : public PacsClient {
                      header.instance_uid, " and does not find it: tried again"));
   }
 
-  absl::Status HttpFailed(const PacsHttpAnswer& answer, absl::string_view what) const {
+  absl::Status HttpFailed(const HttpAnswer& answer, absl::string_view what) const {
     const std::string message = absl::StrCat("the PACS '", peer_.name, "' answers ", what,
                                              " with HTTP status ", answer.status);
     switch (answer.status) {
@@ -277,12 +277,8 @@ absl::StatusOr<std::unique_ptr<PacsClient>> MakeDicomWebClient(const PacsPeer& p
   PacsPeer checked = peer;
   checked.url = std::string(absl::StripSuffix(peer.url, "/"));
   TF_RETURN_IF_ERROR(CheckPacsUrl(checked));
-  if (peer.tls && !peer.tls->authorities.empty()) {
-    TF_RETURN_IF_ERROR(ReadPemFile(peer.tls->authorities).status());
-  }
-  if (peer.tls && !peer.tls->certificate.empty()) {
-    TF_RETURN_IF_ERROR(ReadPemFile(peer.tls->certificate).status());
-    TF_RETURN_IF_ERROR(ReadSecretPemFile(peer.tls->key).status());
+  if (peer.tls) {
+    TF_RETURN_IF_ERROR(ReadTlsFiles(*peer.tls).status());
   }
   return std::make_unique<DicomWebClient>(std::move(checked));
 }

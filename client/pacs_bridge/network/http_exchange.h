@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "absl/strings/string_view.h"
 
 #include "client/pacs_bridge/network/pacs_client.h"
+#include "server/platform/http/http_client.h"
 
 namespace tissueform {
 
@@ -27,20 +27,14 @@ struct PacsHttpRequest {
 using TakeBody =
     std::function<absl::Status(const std::string& content_type, absl::string_view piece)>;
 
-struct PacsHttpAnswer {
-  int status = 0;
-  std::string content_type = {};
-  std::string body = {};  // of others than 200, its first 64 KiB
-};
-
 // Errors: InvalidArgument when it is no URL, holds a password, or is http for another machine.
 absl::Status CheckPacsUrl(const PacsPeer& peer);
 
-// One request and its answer, whatever its status; redirections are not followed.
-// REQUIRES: CheckPacsUrl.
+// One request and its answer, whatever its status; its body is empty at status 200 (see `take`) and
+// otherwise the first 64 KiB. REQUIRES: CheckPacsUrl.
 //
 // Errors: those of PacsClient, and of `take`.
-absl::StatusOr<PacsHttpAnswer> Exchange(const PacsPeer& peer, const PacsHttpRequest& request,
-                                        const TakeBody& take);
+absl::StatusOr<HttpAnswer> Exchange(const PacsPeer& peer, const PacsHttpRequest& request,
+                                    const TakeBody& take);
 
 }  // namespace tissueform

@@ -3,7 +3,6 @@
 
 #include "client/pacs_bridge/network/tls_layer.h"
 
-#include <chrono>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -12,7 +11,6 @@
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
 
-#include "core/base/certificates.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -20,18 +18,13 @@ namespace {
 
 // What is wrong with the files is said here: DCMTK would say it in a log.
 absl::Status CheckFiles(const TlsFiles& files) {
-  TF_ASSIGN_OR_RETURN(const std::string chain, ReadPemFile(files.certificate));
-  TF_ASSIGN_OR_RETURN(const std::string key, ReadSecretPemFile(files.key));
-  TF_ASSIGN_OR_RETURN(const std::string authorities, ReadPemFile(files.authorities));
-  if (const auto checked = CheckIdentity(chain, key, std::chrono::system_clock::now());
-      !checked.ok()) {
-    return absl::Status(checked.status().code(),
-                        absl::StrCat(files.certificate, ": ", checked.status().message()));
+  if (files.certificate.empty() || files.authorities.empty()) {
+    return absl::InvalidArgumentError(
+        "TLS for DICOM needs a certificate, its key and authorities: give --dicom-cert, "
+        "--dicom-key and --dicom-ca");
   }
-  if (const absl::Status checked = CheckAuthorities(authorities); !checked.ok()) {
-    return absl::Status(checked.code(), absl::StrCat(files.authorities, ": ", checked.message()));
-  }
-  return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const TlsContents contents, ReadTlsFiles(files));
+  return CheckTlsContents(files, contents).status();
 }
 
 // An address is compared with addresses in the certificate, a name with names.

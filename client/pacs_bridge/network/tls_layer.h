@@ -8,23 +8,18 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/base/certificates.h"
+
 class DcmTransportLayer;
 
 namespace tissueform {
-
-// PEM files by which both sides of a connection are known.
-struct TlsFiles {
-  std::string certificate = {};  // a chain, the own one first
-  std::string key = {};          // that nobody else may read
-  std::string authorities = {};  // which sign the peers' certificates
-};
 
 enum class TlsRole { kReceiver, kSender };
 
 // The secure layer of DICOM associations: TLS 1.2 and 1.3 by the profile BCP 195, a certificate
 // asked of both sides. A sender also compares the peer's certificate with `host`.
 //
-// Errors name the file: those of ReadPemFile, ReadSecretPemFile, CheckIdentity, CheckAuthorities.
+// Errors: InvalidArgument (a file is not named); those of ReadTlsFiles and CheckTlsContents.
 absl::StatusOr<std::shared_ptr<DcmTransportLayer>> MakeTlsLayer(const TlsFiles& files, TlsRole role,
                                                                 const std::string& host = {});
 

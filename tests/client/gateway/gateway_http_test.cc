@@ -299,50 +299,12 @@ TEST_F(GatewayHttpTest, AnEndingGatewayEndsCallsWithAStatus) {
 
 TEST_F(GatewayHttpTest, AServerThatIsAwayIsUnavailable) {
   GatewayOptions options;
-  options.servers = {"unix:/nonexistent/tissueform.sock"};
+  options.server = "unix:/nonexistent/tissueform.sock";
   options.port = 0;
   auto alone = Gateway::Start(options);
   ASSERT_TRUE(alone.ok());
   EXPECT_EQ(StatusOf(Ask((*alone)->port(), "GET /readyz HTTP/1.1")), 503);
   EXPECT_THAT(AskWeb((*alone)->port(), kWebEcho, WebBody("")), HasSubstr("grpc-status: 14\r\n"));
-}
-
-TEST_F(GatewayHttpTest, SessionsStayWithOneOfTheServersThatAreHealthy) {
-  FakeServer other;
-  GatewayOptions options;
-  options.servers = {server_.address(), other.address()};
-  options.port = 0;
-  auto gateway = Gateway::Start(options);
-  ASSERT_TRUE(gateway.ok());
-  const auto port_of_both = (*gateway)->port();
-  const auto hold = [&](RawClient* client, int session) {
-    client->Send(Request(absl::StrCat("POST ", kWebSilent),
-                         absl::StrCat(WebFields(), "content-length: 5\r\nx-tissueform-session: ",
-                                      "sessions/", session, "\r\n")) +
-                 WebBody(""));
-  };
-  const auto both_ready = [&] {
-    // Calls of many sessions reach both once both are known to be healthy.
-    std::vector<std::unique_ptr<RawClient>> clients;
-    for (int i = 0; i < 16; ++i) {
-      clients.push_back(std::make_unique<RawClient>(port_of_both));
-      hold(clients.back().get(), i);
-    }
-    EXPECT_TRUE(Becomes([&] { return server_.open + other.open == 16; }));
-    const bool both = server_.open > 0 && other.open > 0;
-    clients.clear();
-    EXPECT_TRUE(Becomes([&] { return server_.open + other.open == 0; }));
-    return both;
-  };
-  ASSERT_TRUE(Becomes(both_ready));
-  std::vector<std::unique_ptr<RawClient>> same;
-  for (int i = 0; i < 8; ++i) {
-    same.push_back(std::make_unique<RawClient>(port_of_both));
-    hold(same.back().get(), 1);
-  }
-  EXPECT_TRUE(Becomes([&] { return server_.open + other.open == 8; }));
-  EXPECT_TRUE(server_.open == 0 || other.open == 0);
-  same.clear();
 }
 
 }  // namespace

@@ -7,12 +7,15 @@
 #include <iterator>
 #include <string>
 
+#include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
 #include "tests/testing/test_paths.h"
 
 namespace tissueform {
 namespace {
+
+using ::testing::HasSubstr;
 
 struct Parsed {
   GatewayOptions options;
@@ -31,21 +34,32 @@ Parsed Parse(const std::string& arguments) {
   return parsed;
 }
 
-TEST(GatewayOptions, SeveralServersMayBeNamed) {
-  const Parsed parsed = Parse("--server a:1 unix:/b --server c:3");
+TEST(GatewayOptions, ItsServerHasOneAddress) {
+  const Parsed parsed = Parse("--server a:1");
   EXPECT_EQ(parsed.error, "");
-  EXPECT_EQ(parsed.options.servers, (std::vector<std::string>{"a:1", "unix:/b", "c:3"}));
+  EXPECT_EQ(parsed.options.server, "a:1");
   EXPECT_EQ(parsed.options.host, "127.0.0.1");
   EXPECT_EQ(parsed.options.port, 8080);
+  EXPECT_EQ(Parse("--server unix:/run/a=b").options.server, "unix:/run/a=b");
+  EXPECT_EQ(Parse("--server [::1]:1").options.server, "[::1]:1");
 }
 
-TEST(GatewayOptions, ServersOfAClusterHaveNames) {
-  const Parsed parsed = Parse("--server left=a:1 --server right=unix:/b");
-  EXPECT_EQ(parsed.error, "");
-  EXPECT_EQ(parsed.options.servers, (std::vector<std::string>{"left=a:1", "right=unix:/b"}));
+TEST(GatewayOptions, SeveralServersAreHaproxys) {
+  for (const char* text : {"--server a:1 --server b:2", "--server a:1 unix:/b",
+                           "--server left=a:1 --server right=b:1", "--server left=a:1"}) {
+    const std::string error = Parse(text).error;
+    EXPECT_THAT(error, HasSubstr("put HAProxy before the servers")) << text;
+    EXPECT_THAT(error, HasSubstr("docs/gateway.md")) << text;
+    EXPECT_EQ(error.find('\n'), std::string::npos) << text;
+  }
 }
 
-TEST(GatewayOptions, OneServerAtLeastIsNeeded) { EXPECT_NE(Parse("").error, ""); }
+TEST(GatewayOptions, WhatIsNotAnAddressIsRefused) {
+  EXPECT_NE(Parse("").error, "");
+  for (const char* text : {"a", ":1", "a:0", "a:65536", "a:b"}) {
+    EXPECT_THAT(Parse(std::string("--server ") + text).error, HasSubstr("give HOST:PORT")) << text;
+  }
+}
 
 TEST(GatewayOptions, AddressesToListenOnAreHostAndPort) {
   EXPECT_EQ(Parse("--server a:1 --listen localhost:0").options.port, 0);

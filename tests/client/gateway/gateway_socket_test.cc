@@ -113,25 +113,6 @@ TEST_F(GatewaySocketTest, HeartbeatsLeaveTheServersMessagesInOrder) {
   }
 }
 
-TEST_F(GatewaySocketTest, ANodeThatIsAnotherEndsTheCallWithItsReason) {
-  GatewayOptions options;
-  options.servers = {"fake=" + server_.address()};
-  options.port = 0;
-  auto cluster = Gateway::Start(options);
-  ASSERT_TRUE(cluster.ok());
-  RawSocket socket((*cluster)->port());
-  v1::GatewayCallStart start;
-  start.set_method(kEcho);
-  (*start.mutable_metadata())["x-tissueform-node"] = "other";
-  socket.SendOurs(SocketFrameKind::kStart, start.SerializeAsString());
-  const v1::GatewayCallEnd end = socket.ReceiveEnd();
-  EXPECT_EQ(end.code(), 14);
-  EXPECT_THAT(end.status_details(), HasSubstr("WRONG_NODE"));
-  EXPECT_EQ(socket.ReceiveClose(), 1000);
-  EXPECT_EQ(server_.open, 0);
-  socket.raw().HalfClose();
-}
-
 TEST_F(GatewaySocketTest, WhatIsSentAtOnceArrivesInOrder) {
   RawSocket socket(port());
   std::string sent;

@@ -27,7 +27,7 @@ class GatewayTest : public ::testing::Test {
   void Restart(const GatewayLimits& limits, const LoginConfig& login = {}) {
     gateway_.reset();
     GatewayOptions options;
-    options.servers = {server_.address()};
+    options.server = server_.address();
     options.port = 0;
     options.limits = limits;
     options.login = login;

@@ -88,7 +88,7 @@ TEST_F(LoginGatewayTest, TheConfigurationIsReadOnly) {
 
 TEST_F(LoginGatewayTest, AGatewayWithAWrongProviderDoesNotStart) {
   GatewayOptions options;
-  options.servers = {server_.address()};
+  options.server = server_.address();
   options.port = 0;
   options.login = {.issuer = "http://login.example.org", .client_id = "planner"};
   EXPECT_THAT(std::string(Gateway::Start(options).status().message()), HasSubstr("--oidc-issuer"));

@@ -89,6 +89,30 @@ TEST_F(CertificatesTest, FilesAreBounded) {
   std::filesystem::remove_all(folder);
 }
 
+TEST_F(CertificatesTest, TlsFilesAreReadAndCheckedByName) {
+  const std::filesystem::path folder = EmptyTestFolder("tls_files");
+  const TestFiles own = authority_.IssueFiles(folder, "own");
+  const TestFiles other = authority_.IssueFiles(folder, "other");
+  const auto check = [](const TlsFiles& files) {
+    const auto contents = ReadTlsFiles(files);
+    return contents.ok() ? CheckTlsContents(files, *contents).status() : contents.status();
+  };
+  EXPECT_THAT(check({}), IsOk());
+  EXPECT_THAT(check({own.certificate, own.key, own.roots}), IsOk());
+  EXPECT_THAT(check({.certificate = own.certificate}), StatusIs(kInvalid, HasSubstr("both")));
+  EXPECT_THAT(check({.key = own.key}), StatusIs(kInvalid, HasSubstr("both")));
+  EXPECT_THAT(check({.authorities = own.key}), StatusIs(kInvalid, HasSubstr(own.key)));
+  EXPECT_THAT(check({own.certificate, other.key}), StatusIs(kInvalid, HasSubstr(own.certificate)));
+  EXPECT_THAT(check({.authorities = folder / "none"}), StatusIs(absl::StatusCode::kNotFound));
+  const TlsFiles alone = {.authorities = own.roots};
+  EXPECT_EQ(*CheckTlsContents(alone, *ReadTlsFiles(alone)),
+            std::chrono::system_clock::time_point());
+  const TlsFiles whole = {own.certificate, own.key, own.roots};
+  EXPECT_EQ(*CheckTlsContents(whole, *ReadTlsFiles(whole)),
+            ReadCertificate(ReadTlsFiles(whole)->certificate)->not_after);
+  std::filesystem::remove_all(folder);
+}
+
 TEST_F(CertificatesTest, AKeyThatEverybodyMayReadIsRefused) {
   const std::filesystem::path folder = EmptyTestFolder("secret");
   const TestFiles files = authority_.IssueFiles(folder, "server");

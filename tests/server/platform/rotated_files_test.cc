@@ -36,7 +36,7 @@ class RotatedFilesTest : public ::testing::Test {
 
   absl::StatusOr<std::unique_ptr<RotatedFiles>> Load() const {
     return RotatedFiles::Load(
-        {.certificate = files_.certificate, .key = files_.key, .roots = files_.roots});
+        {.certificate = files_.certificate, .key = files_.key, .authorities = files_.roots});
   }
 
   const std::filesystem::path folder_ = EmptyTestFolder("rotated");

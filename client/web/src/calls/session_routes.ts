@@ -80,7 +80,7 @@ export class SessionRoutes {
 
 const UNREACHED = new CallError(
   Code.FailedPrecondition,
-  "the gateway does not know the server of this session; tell the administrator that the gateway needs a --server with its name",
+  "the proxy before the servers does not know the server of this session; tell the administrator that it needs its name and address",
 );
 
 /** Metadata by which a proxy may send all calls of a session to one server. */

@@ -50,7 +50,7 @@ test.each([
   expect(routes.metadata("s")).toEqual({});
 });
 
-test("servers that name a holder which the gateway never reaches end in one error, and do not while it may have died", () => {
+test("servers that name a holder which the proxy never reaches end in one error, and do not while it may have died", () => {
   let now = 0;
   const routes = new SessionRoutes(() => now);
   const backoff = new Backoff(() => 0, () => now);
@@ -65,7 +65,7 @@ test("servers that name a holder which the gateway never reaches end in one erro
   expect(now).toBeGreaterThan(20_000);
   const last = turn();
   expect(last.isPassing).toBe(false);
-  expect(last.message).toMatch("gateway");
+  expect(last.message).toMatch("the proxy before the servers");
   expect(turn().isPassing).toBe(true);
   for (let i = 0; i < 100; ++i) {
     now += 6000;

@@ -39,7 +39,7 @@ class DeviceLoginTest : public ::testing::Test {
     return login_.Run([this](const DevicePrompt& prompt) { prompts_.push_back(prompt); });
   }
 
-  absl::StatusOr<HttpAnswer> Answer(const HttpRequest& request) {
+  absl::StatusOr<HttpAnswer> Answer(const LoginRequest& request) {
     requests_.push_back(request);
     if (answers_.empty()) return absl::UnavailableError("nobody answers");
     absl::StatusOr<HttpAnswer> answer = answers_.front();
@@ -47,20 +47,20 @@ class DeviceLoginTest : public ::testing::Test {
     return answer;
   }
 
-  std::deque<absl::StatusOr<HttpAnswer>> answers_ = {HttpAnswer{200, kDiscovery},
-                                                     HttpAnswer{200, kCode}};
-  std::vector<HttpRequest> requests_;
+  std::deque<absl::StatusOr<HttpAnswer>> answers_ = {HttpAnswer{.status = 200, .body = kDiscovery},
+                                                     HttpAnswer{.status = 200, .body = kCode}};
+  std::vector<LoginRequest> requests_;
   std::vector<DevicePrompt> prompts_;
   std::vector<seconds> waits_;
   DeviceLogin login_{{.issuer = "https://a", .client_id = "cli", .audience = "https://t"},
-                     [this](const HttpRequest& request) { return Answer(request); },
+                     [this](const LoginRequest& request) { return Answer(request); },
                      [this](seconds time) { waits_.push_back(time); }};
 };
 
 TEST_F(DeviceLoginTest, WaitsUntilTheUserHasGoneTheWay) {
-  answers_.insert(answers_.end(),
-                  {Error("authorization_pending"), Error("slow_down"),
-                   absl::UnavailableError("away for a moment"), HttpAnswer{200, kTokens}});
+  answers_.insert(answers_.end(), {Error("authorization_pending"), Error("slow_down"),
+                                   absl::UnavailableError("away for a moment"),
+                                   HttpAnswer{.status = 200, .body = kTokens}});
   const auto tokens = Run();
   ASSERT_TRUE(tokens.ok()) << tokens.status();
   EXPECT_EQ(tokens->access_token, "eyJ");
@@ -95,7 +95,8 @@ TEST_F(DeviceLoginTest, TellsWhatTheUserHasRefused) {
 }
 
 TEST_F(DeviceLoginTest, RenewsAndKeepsTheRefreshTokenWhereNoneComes) {
-  answers_ = {HttpAnswer{200, kDiscovery}, HttpAnswer{200, R"({"access_token": "new"})"}};
+  answers_ = {HttpAnswer{.status = 200, .body = kDiscovery},
+              HttpAnswer{.status = 200, .body = R"({"access_token": "new"})"}};
   const auto tokens = login_.Renew("old");
   ASSERT_TRUE(tokens.ok()) << tokens.status();
   EXPECT_EQ(tokens->access_token, "new");
@@ -105,19 +106,20 @@ TEST_F(DeviceLoginTest, RenewsAndKeepsTheRefreshTokenWhereNoneComes) {
 }
 
 TEST_F(DeviceLoginTest, ARefusedRenewalIsARefusal) {
-  answers_ = {HttpAnswer{200, kDiscovery}, Error("invalid_grant")};
+  answers_ = {HttpAnswer{.status = 200, .body = kDiscovery}, Error("invalid_grant")};
   EXPECT_EQ(login_.Renew("old").status().code(), absl::StatusCode::kPermissionDenied);
 }
 
 TEST_F(DeviceLoginTest, AProviderOfAnotherNameIsNamedWithTheExpectedOne) {
-  answers_ = {HttpAnswer{200, R"({"issuer": "https://b/", "token_endpoint": "https://b/token"})"}};
+  answers_ = {HttpAnswer{
+      .status = 200, .body = R"({"issuer": "https://b/", "token_endpoint": "https://b/token"})"}};
   EXPECT_THAT(
       std::string(Run().status().message()),
       HasSubstr("issuer is https://b/, and --issuer says https://a; give --issuer https://b/"));
-  answers_ = {HttpAnswer{200, R"({"issuer": "https://a/{tenantid}/v2.0"})"}};
+  answers_ = {HttpAnswer{.status = 200, .body = R"({"issuer": "https://a/{tenantid}/v2.0"})"}};
   EXPECT_THAT(std::string(Run().status().message()),
               HasSubstr("https://a/{tenantid}/v2.0, shared by all tenants"));
-  answers_ = {HttpAnswer{200, R"({"issuer": "https://\u001b[2J"})"}};
+  answers_ = {HttpAnswer{.status = 200, .body = R"({"issuer": "https://\u001b[2J"})"}};
   EXPECT_THAT(std::string(Run().status().message()), HasSubstr("does not name an issuer"));
 }
 
@@ -142,43 +144,45 @@ TEST_P(BadAnswerTest, IsAnErrorOfOneLine) {
 HttpAnswer Good(const std::string& body) { return {.status = 200, .body = body}; }
 
 std::vector<BadAnswer> BadAnswers() {
-  return {BadAnswer{"NobodyThere", {}, absl::StatusCode::kUnavailable},
-          BadAnswer{"NoJson", {Good("<html>")}, absl::StatusCode::kDataLoss},
-          BadAnswer{"NoObject", {Good("[1]")}, absl::StatusCode::kDataLoss},
-          BadAnswer{"DeepJson", {Good(std::string(200'000, '['))}, absl::StatusCode::kDataLoss},
-          BadAnswer{"NotFound", {HttpAnswer{404, kDiscovery}}, absl::StatusCode::kDataLoss},
-          BadAnswer{"OtherIssuer",
-                    {Good(R"({"issuer": "https://b", "token_endpoint": "https://b/token"})")},
-                    absl::StatusCode::kDataLoss},
-          BadAnswer{"PlainTokenEndpoint",
-                    {Good(R"({"issuer": "https://a", "token_endpoint": "http://a/token"})")},
-                    absl::StatusCode::kInvalidArgument},
-          BadAnswer{"NoDeviceFlow",
-                    {Good(R"({"issuer": "https://a", "token_endpoint": "https://a/token"})")},
-                    absl::StatusCode::kFailedPrecondition},
-          BadAnswer{"UnknownClient",
-                    {Good(kDiscovery), Error("invalid_client")},
-                    absl::StatusCode::kPermissionDenied},
-          BadAnswer{"ErrorWithControlCharacters",
-                    {Good(kDiscovery), Error("\\u001b[2J\\n")},
-                    absl::StatusCode::kPermissionDenied},
-          BadAnswer{"CodeWithControlCharacters",
-                    {Good(kDiscovery), Good(R"({"device_code": "d", "user_code": "\u001b[2J",
+  return {
+      BadAnswer{"NobodyThere", {}, absl::StatusCode::kUnavailable},
+      BadAnswer{"NoJson", {Good("<html>")}, absl::StatusCode::kDataLoss},
+      BadAnswer{"NoObject", {Good("[1]")}, absl::StatusCode::kDataLoss},
+      BadAnswer{"DeepJson", {Good(std::string(200'000, '['))}, absl::StatusCode::kDataLoss},
+      BadAnswer{
+          "NotFound", {HttpAnswer{.status = 404, .body = kDiscovery}}, absl::StatusCode::kDataLoss},
+      BadAnswer{"OtherIssuer",
+                {Good(R"({"issuer": "https://b", "token_endpoint": "https://b/token"})")},
+                absl::StatusCode::kDataLoss},
+      BadAnswer{"PlainTokenEndpoint",
+                {Good(R"({"issuer": "https://a", "token_endpoint": "http://a/token"})")},
+                absl::StatusCode::kInvalidArgument},
+      BadAnswer{"NoDeviceFlow",
+                {Good(R"({"issuer": "https://a", "token_endpoint": "https://a/token"})")},
+                absl::StatusCode::kFailedPrecondition},
+      BadAnswer{"UnknownClient",
+                {Good(kDiscovery), Error("invalid_client")},
+                absl::StatusCode::kPermissionDenied},
+      BadAnswer{"ErrorWithControlCharacters",
+                {Good(kDiscovery), Error("\\u001b[2J\\n")},
+                absl::StatusCode::kPermissionDenied},
+      BadAnswer{"CodeWithControlCharacters",
+                {Good(kDiscovery), Good(R"({"device_code": "d", "user_code": "\u001b[2J",
                   "verification_uri": "https://a/go"})")},
-                    absl::StatusCode::kDataLoss},
-          BadAnswer{"NumbersForTexts",
-                    {Good(kDiscovery), Good(R"({"device_code": 1, "user_code": 2,
+                absl::StatusCode::kDataLoss},
+      BadAnswer{"NumbersForTexts",
+                {Good(kDiscovery), Good(R"({"device_code": 1, "user_code": 2,
                   "verification_uri": "https://a/go"})")},
-                    absl::StatusCode::kDataLoss},
-          BadAnswer{"UserSentElsewhere",
-                    {Good(kDiscovery), Good(R"({"device_code": "d", "user_code": "e",
+                absl::StatusCode::kDataLoss},
+      BadAnswer{"UserSentElsewhere",
+                {Good(kDiscovery), Good(R"({"device_code": "d", "user_code": "e",
                   "verification_uri": "javascript:x"})")},
-                    absl::StatusCode::kInvalidArgument},
-          BadAnswer{
-              "NoToken", {Good(kDiscovery), Good(kCode), Good("{}")}, absl::StatusCode::kDataLoss},
-          BadAnswer{"TokenWithLines",
-                    {Good(kDiscovery), Good(kCode), Good(R"({"access_token": "a\nb"})")},
-                    absl::StatusCode::kDataLoss}};
+                absl::StatusCode::kInvalidArgument},
+      BadAnswer{
+          "NoToken", {Good(kDiscovery), Good(kCode), Good("{}")}, absl::StatusCode::kDataLoss},
+      BadAnswer{"TokenWithLines",
+                {Good(kDiscovery), Good(kCode), Good(R"({"access_token": "a\nb"})")},
+                absl::StatusCode::kDataLoss}};
 }
 
 INSTANTIATE_TEST_SUITE_P(Answers, BadAnswerTest, ::testing::ValuesIn(BadAnswers()),

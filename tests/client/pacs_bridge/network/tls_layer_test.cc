@@ -116,6 +116,8 @@ TEST(TlsLayer, FilesThatDoNotFitAreNamed) {
   missing.authorities = keys / "none.pem";
   EXPECT_THAT(MakeTlsLayer(missing, TlsRole::kReceiver).status(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("none.pem")));
+  EXPECT_THAT(MakeTlsLayer({}, TlsRole::kSender).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--dicom-cert")));
   fs::permissions(good.key, fs::perms::others_read, fs::perm_options::add);
   EXPECT_THAT(MakeTlsLayer(good, TlsRole::kReceiver).status(),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("good.key")));

@@ -205,17 +205,6 @@ TEST_F(EstimatedRotationTest, WarmStartNeedsFewerStepsToTheSameAnswer) {
   EXPECT_LT(LargestDistance(warm.positions, reference.positions), 1e-4);
 }
 
-TEST_F(EstimatedRotationTest, AnswerDoesNotDependOnTheNumberOfThreads) {
-  GradientFieldOptions options = Estimated();
-  ASSERT_OK_AND_ASSIGN(const Deformation one, Deform(options));
-  for (const int threads : {2, 3}) {
-    options.threads = threads;
-    ASSERT_OK_AND_ASSIGN(const Deformation several, Deform(options));
-    EXPECT_EQ(one.positions, several.positions);
-    EXPECT_EQ(one.summary.changes_mm, several.summary.changes_mm);
-  }
-}
-
 TEST_F(EstimatedRotationTest, OptionsOutOfRangeAreRefused) {
   EXPECT_THAT(Deform(Estimated(BlendMap::kCosine, 5, 0)),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("tolerance_mm")));

@@ -310,29 +310,6 @@ TEST(GradientFieldDeformerOracleTest, FullTwistIsNotNothing) {
   EXPECT_EQ(quality.inverted_tets, 0);
 }
 
-TEST(GradientFieldDeformerOracleTest, OneRigidPoseOnEverythingIsThatRigidMotion) {
-  // No fixed region: two handles carry all constraints.
-  const TetMesh bar = testing::Bar({3, 3, 6}, 2.0, 0.2);
-  const double top = bar.positions().col(2).maxCoeff() - 1.0;
-  ASSERT_OK_AND_ASSIGN(
-      const ConstraintSet constraints,
-      ConstraintSet::Create(
-          bar, {},
-          {{"low", testing::SelectVertices(bar, [](const auto& v) { return v.z() < 1.0; })},
-           {"high", testing::SelectVertices(bar, [=](const auto& v) { return v.z() > top; })}}));
-  ASSERT_OK_AND_ASSIGN(
-      const auto deformer,
-      CreateGradientFieldDeformer(bar, RandomStiffness(bar.num_tets()), constraints, {}));
-  const HandlePose pose = SomePose(bar.BoundingBoxDiagonal());
-  const std::vector<HandlePose> poses = {pose, pose};
-  ASSERT_OK_AND_ASSIGN(const Deformation result, deformer->Deform(poses));
-  Positions expected(bar.num_vertices(), 3);
-  for (Eigen::Index v = 0; v < bar.num_vertices(); ++v) {
-    expected.row(v) = ApplyPose(pose, bar.positions().row(v).transpose());
-  }
-  EXPECT_LT(LargestDistance(result.positions, expected), 1e-11 * bar.BoundingBoxDiagonal());
-}
-
 TEST(GradientFieldDeformerOracleTest, WithoutRotationTheAnswerIsTheHarmonicExtension) {
   const Problem problem = MakeProblem(testing::Bar({3, 3, 6}, 2.0, 0.2), 1);
   GradientFieldOptions options;

@@ -29,8 +29,7 @@ constexpr NeoHookeanOptions kNewton = {.tolerance = 1e-6, .newton_after = 0};
 // Cells of 1 mm, jittered; layers of `ends_mm` at both ends of the z axis, the lower one fixed (or
 // a second handle), the upper one the handle "top".
 std::shared_ptr<MeshPreparation> PrepareBlock(const std::array<int, 3>& cells, double ends_mm,
-                                              bool is_base_fixed = true,
-                                              PreparationOptions options = {}) {
+                                              bool is_base_fixed = true) {
   const TetMesh mesh = testing::Bar(cells, 1.0, 0.1);
   auto base = testing::SelectVertices(
       mesh, [&](const Eigen::Vector3d& v) { return v.z() < ends_mm + 0.5; });
@@ -41,7 +40,7 @@ std::shared_ptr<MeshPreparation> PrepareBlock(const std::array<int, 3>& cells, d
           ? ConstraintSet::Create(mesh, std::move(base), {{"top", std::move(top)}})
           : ConstraintSet::Create(mesh, {}, {{"base", std::move(base)}, {"top", std::move(top)}});
   const Eigen::VectorXd stiffness = Eigen::VectorXd::Constant(mesh.num_tets(), 15000.0);
-  return MeshPreparation::Create(mesh, stiffness, constraints.value(), std::move(options)).value();
+  return MeshPreparation::Create(mesh, stiffness, constraints.value(), {}).value();
 }
 
 HandlePose PoseAbout(const Eigen::Vector3d& rotation_vector, const Eigen::Vector3d& pivot_mm,
@@ -55,9 +54,7 @@ HandlePose PoseAbout(const Eigen::Vector3d& rotation_vector, const Eigen::Vector
 
 // A limb of 1 x 1 x 40 mm whose end is turned by 60 degrees, moved aside and pushed together: it
 // buckles.
-std::shared_ptr<MeshPreparation> PrepareLimb(PreparationOptions options = {}) {
-  return PrepareBlock({1, 1, 40}, 0, true, std::move(options));
-}
+std::shared_ptr<MeshPreparation> PrepareLimb() { return PrepareBlock({1, 1, 40}, 0); }
 HandlePose LimbPose() {
   return PoseAbout({std::numbers::pi / 3, 0, 0}, {0.5, 0.5, 40}, {3.2, 0, -5});
 }
@@ -275,15 +272,6 @@ TEST(NewtonFallbackTest, WarmStartEndsAtTheSameAnswer) {
   ExpectEquilibrium(*preparation, started);
   const Deformation cold = Solve(preparation, {.tolerance = 1e-7}, {pose});
   EXPECT_LT((started.positions - cold.positions).cwiseAbs().maxCoeff(), 1e-3);
-}
-
-TEST(NewtonFallbackTest, DoesNotDependOnThreads) {
-  const auto answer = [](int threads) {
-    PreparationOptions options;
-    options.threads = threads;
-    return Solve(PrepareLimb(std::move(options)), {}, {LimbPose()});
-  };
-  EXPECT_EQ(answer(1).positions, answer(3).positions);
 }
 
 TEST(NewtonFallbackTest, NegativePatienceIsRefused) {

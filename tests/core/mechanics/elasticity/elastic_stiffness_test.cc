@@ -23,8 +23,8 @@ struct Body {
         vertex_cells(elements.cells, elements.num_vertices()),
         stiffness(Eigen::VectorXd::Constant(mesh.num_tets(), 3000.0)) {}
 
-  SparseMatrix Stiffness(double nu = kPoissonRatio, int threads = 1) const {
-    return ElasticStiffness(elements, vertex_cells, stiffness, nu, threads);
+  SparseMatrix Stiffness(double nu = kPoissonRatio) const {
+    return ElasticStiffness(elements, vertex_cells, stiffness, nu, 1);
   }
   // Forces that hold a field of displacements, #V by 3.
   Positions Forces(const Positions& displacements, double nu = kPoissonRatio) const {
@@ -108,11 +108,6 @@ TEST(ElasticStiffnessTest, IsTheNeoHookeanEnergysSecondDerivativeAtRest) {
   energy.Evaluate(-step * direction, &minus);
   const Positions difference = (plus - minus) / (2 * step);
   EXPECT_LT((difference - body.Forces(direction)).norm(), 1e-8 * difference.norm());
-}
-
-TEST(ElasticStiffnessTest, DoesNotDependOnThreads) {
-  const Body body(testing::Bar({11, 11, 12}, 1.0, 0.1));
-  EXPECT_EQ(SparseMatrix(body.Stiffness(kPoissonRatio, 3) - body.Stiffness()).norm(), 0.0);
 }
 
 TEST(ElasticStiffnessTest, VerticesWithoutTetsHaveEmptyColumns) {

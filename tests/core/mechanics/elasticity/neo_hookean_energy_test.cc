@@ -21,12 +21,12 @@ const double kShear = kYoungsModulus / (2 * (1 + kPoissonRatio));
 const double kBulk = kYoungsModulus / (3 * (1 - 2 * kPoissonRatio));
 
 struct Body {
-  explicit Body(TetMesh tet_mesh, int threads = 1)
+  explicit Body(TetMesh tet_mesh)
       : mesh(std::move(tet_mesh)),
         elements(ElementsOf(mesh)),
         vertex_cells(elements.cells, elements.num_vertices()),
         stiffness(Eigen::VectorXd::Constant(mesh.num_tets(), kYoungsModulus)),
-        energy(elements, vertex_cells, stiffness, kPoissonRatio, threads) {}
+        energy(elements, vertex_cells, stiffness, kPoissonRatio, 1) {}
   Body(const Body&) = delete;
   Body& operator=(const Body&) = delete;
 
@@ -158,16 +158,6 @@ TEST_P(NeoHookeanEnergyTest, DisplacementsThatAreNotFiniteCountAsInverted) {
   displacements(5, 1) = std::numeric_limits<double>::quiet_NaN();
   Positions forces;
   EXPECT_GT(body.energy.Evaluate(displacements, &forces).inverted_tets, 0);
-}
-
-TEST_P(NeoHookeanEnergyTest, DoesNotDependOnThreads) {
-  Body one(testing::Bar({9, 9, 10}, 1.0, 0.1));
-  Body three(one.mesh, 3);
-  const Positions displacements = 0.05 * Positions::Random(one.mesh.num_vertices(), 3);
-  Positions forces_of_one, forces_of_three;
-  EXPECT_EQ(one.energy.Evaluate(displacements, &forces_of_one).energy_nj,
-            three.energy.Evaluate(displacements, &forces_of_three).energy_nj);
-  EXPECT_EQ(forces_of_one, forces_of_three);
 }
 
 }  // namespace

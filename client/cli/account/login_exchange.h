@@ -5,34 +5,27 @@
 
 #include <functional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "server/platform/http/http_client.h"
+
 namespace tissueform {
 
-using HttpForm = std::vector<std::pair<std::string, std::string>>;
-
-// GET without a form, else POST of it.
-struct HttpRequest {
+// GET without a form, otherwise POST of it.
+struct LoginRequest {
   std::string url;
   HttpForm form = {};
 };
 
-struct HttpAnswer {
-  int status = 0;
-  std::string body = {};
-};
-
 // Makes a request and waits for its answer, whatever its status. Errors: Unavailable, with the
-// host's name and what stood in the way.
-using HttpExchange = std::function<absl::StatusOr<HttpAnswer>(const HttpRequest& request)>;
+// host's name and the cause.
+using LoginExchange = std::function<absl::StatusOr<HttpAnswer>(const LoginRequest& request)>;
 
-// By libcurl: asks the URL and nobody else (no redirects), takes 256 KiB at most, ends within 30 s.
-// The system's certificates decide whom to trust. REQUIRES: CheckLoginUrl.
-HttpExchange CurlExchange();
+// Over the network, by the proxy that the environment names: follows no redirect, takes 256 KiB at
+// most, ends within 30 s. The system's certificates decide whom to trust. REQUIRES: CheckLoginUrl.
+absl::StatusOr<HttpAnswer> AskProvider(const LoginRequest& request);
 
 // That `url` is one to which secrets may go: https, or http of this machine; without a password,
 // printable, 2 KiB at most. Errors: InvalidArgument, which names `what` it is.
