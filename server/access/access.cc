@@ -174,6 +174,18 @@ absl::Status Access::CheckSessionAccess(const Principal& caller, const std::stri
                                         Permission need) const {
   TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kSession, id));
   MutexLock lock(mutex_);
+  return JudgeSession(caller, id, need);
+}
+
+absl::Status Access::RecheckSessionAccess(const Principal& caller, const std::string& id,
+                                          Permission need) const {
+  MutexLock lock(mutex_);
+  if (index_.FindSession(id) == nullptr) return absl::OkStatus();
+  return JudgeSession(caller, id, need);
+}
+
+absl::Status Access::JudgeSession(const Principal& caller, const std::string& id,
+                                  Permission need) const {
   if (caller.only_session == SessionResource(id) && !HasGoodLink(id)) return LinkHasEnded();
   return Judge(SessionLevel(caller, id), need, NoSuchSession(id));
 }

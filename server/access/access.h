@@ -73,6 +73,11 @@ class Access {
   // Errors: NotFound, PermissionDenied; Unauthenticated for a follow link that has ended.
   absl::Status CheckSessionAccess(const Principal& caller, const std::string& id,
                                   Permission need) const;
+  // As CheckSessionAccess, for a call that lasts and was allowed when it began. Never blocks, not
+  // even where several servers use one store. OK for a session that is gone: what uses it ends with
+  // the reason for that.
+  absl::Status RecheckSessionAccess(const Principal& caller, const std::string& id,
+                                    Permission need) const;
   absl::Status CheckPredictionAccess(const Principal& caller, const std::string& id,
                                      Permission need) const;
   // Whose case the caller's name of it means: its own, else the first that it may look at.
@@ -124,6 +129,8 @@ class Access {
 
   static absl::Status Judge(Level level, Permission need, const absl::Status& not_found);
   // All with the lock.
+  absl::Status JudgeSession(const Principal& caller, const std::string& id, Permission need) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Level LevelOfShare(const std::string& owner, const std::string& resource,
                      const std::string& project, const std::string& principal) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

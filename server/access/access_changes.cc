@@ -54,7 +54,6 @@ absl::Status AccessChanges::ReloadRows() {
     }
     access_.table_ = std::move(table);
   }
-  on_revoked_();
   return absl::OkStatus();
 }
 
@@ -178,11 +177,7 @@ void AccessChanges::Share(const Principal& caller, ShareRow share, const Done& d
     return;
   }
   share.owner = caller.name;
-  const bool lessens = share.role == ShareRole::kViewer;
-  Put({.shares = {std::move(share)}}, [this, done, lessens](const absl::Status& status) {
-    if (status.ok() && lessens) on_revoked_();
-    done(status);
-  });
+  Put({.shares = {std::move(share)}}, done);
 }
 
 void AccessChanges::Unshare(const Principal& caller, const std::string& resource,
@@ -200,7 +195,6 @@ void AccessChanges::Unshare(const Principal& caller, const std::string& resource
     return;
   }
   Erase({.shares = {{.resource = resource, .owner = caller.name, .principal = with}}}, done);
-  on_revoked_();
 }
 
 absl::StatusOr<std::vector<ShareRow>> AccessChanges::SharesOf(const Principal& caller,
@@ -262,7 +256,6 @@ void AccessChanges::RemoveLinks(const Principal& caller, const std::string& sess
     }
   }
   Erase(std::move(rows), done);
-  on_revoked_();
 }
 
 absl::Status AccessChanges::GrantMesh(const Principal& caller, const std::string& sha256,

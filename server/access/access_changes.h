@@ -30,10 +30,6 @@ class AccessChanges {
   AccessChanges(const AccessOptions& options, AccessStore* store, Access* access)
       : options_(options), store_(store), access_(*access) {}
 
-  // Told when somebody may less than before, from any thread, without a lock held: whoever has
-  // streams asks again for each. Call it before calls are served.
-  void set_on_revoked(std::function<void()> on_revoked) { on_revoked_ = std::move(on_revoked); }
-
   // Told of a prediction that is gone, on the thread that removes it, without a lock held; it may
   // block. Call it before calls are served.
   void set_on_prediction_removed(std::function<void(const std::string& id)> told) {
@@ -139,7 +135,6 @@ class AccessChanges {
   AccessStore* const store_;
   bool follows_ = false;  // constant once calls are served
   Access& access_;
-  std::function<void()> on_revoked_ = [] {};
   std::function<void(const std::string&)> on_prediction_removed_ = [](const std::string&) {};
 
   Mutex learning_;                                                               // over ReloadRows

@@ -196,10 +196,6 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   });
   catalog_.set_on_removed(
       [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
-  access_changes_.set_on_revoked([this] {
-    streams_.RecheckAccess();
-    watches_.RecheckAccess();
-  });
   exports_.set_on_changed(
       [this](const ExportRecord& record) { export_watches_.OnChanged(record); });
   exports_.set_on_exported([this](const std::string& prediction, bool exported) {
