@@ -105,7 +105,7 @@ Access::Level Access::PredictionLevel(const Principal& caller, const std::string
   if (table_.RoleOf(prediction->owner, PredictionResource(id), caller.name).has_value()) {
     return Level::kRead;
   }
-  if (IsBridge(caller) && index_.IsExported(id)) return Level::kRead;
+  if (IsBridge(caller) && exports_ != nullptr && exports_->IsExported(id)) return Level::kRead;
   // Only of one owner: an id of a session may have become another's meanwhile.
   const ResourceIndex::Session* session = index_.FindSession(prediction->session);
   if (session == nullptr || session->owner != prediction->owner) return Level::kNothing;
@@ -113,9 +113,12 @@ Access::Level Access::PredictionLevel(const Principal& caller, const std::string
 }
 
 bool Access::IsExportedCase(const CaseKey& key) const {
-  for (const std::string& id : index_.ExportedOfCase(key.sha256)) {
+  if (exports_ == nullptr) return false;
+  for (const std::string& id : exports_->ExportedOfCase(key.sha256)) {
+    const ResourceIndex::Prediction* prediction = index_.FindPrediction(id);
+    if (prediction == nullptr) continue;
     // Whoever names a case that is not open to them opens it to no bridge.
-    const Principal planner{.name = index_.FindPrediction(id)->owner};
+    const Principal planner{.name = prediction->owner};
     if (CaseLevel(planner, key) >= Level::kRead) return true;
   }
   return false;

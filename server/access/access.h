@@ -19,6 +19,7 @@
 #include "server/access/auth/identity.h"
 #include "server/access/resource_index.h"
 #include "server/access/share_table.h"
+#include "server/exports/export_queue.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
@@ -41,10 +42,12 @@ enum class Permission {
 // then, and then only, somebody is asked who reads that one row (set_on_unknown), which may take a
 // while.
 //
-// Thread-safe. Its lock is held over nothing else.
+// Thread-safe. Its lock is held over nothing but the look-ups in the exports.
 class Access {
  public:
-  explicit Access(UnixClock clock = SystemUnixSeconds) : clock_(std::move(clock)) {}
+  // `exports`, which must outlive it, says what is to go to the PACS; null: nothing is.
+  explicit Access(UnixClock clock = SystemUnixSeconds, const ExportQueue* exports = nullptr)
+      : clock_(std::move(clock)), exports_(exports) {}
 
   // What is not known here.
   struct Unknown {
@@ -157,6 +160,7 @@ class Access {
   bool Knows(const Unknown& what) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const UnixClock clock_;
+  const ExportQueue* const exports_;                        // null: nothing is exported
   int64_t most_bytes_ = 0;                                  // of one principal
   std::function<absl::Status(const Unknown&)> on_unknown_;  // empty: all that there is is known
 

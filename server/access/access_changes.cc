@@ -293,7 +293,6 @@ void AccessChanges::PredictionRemoved(const std::string& id) {
     access_.index_.RemovePrediction(id);
   }
   Erase(std::move(rows), WarnUnlessErased);
-  on_prediction_removed_(id);
 }
 
 void AccessChanges::CaseRemoved(const CaseKey& key) {

@@ -30,12 +30,6 @@ class AccessChanges {
   AccessChanges(const AccessOptions& options, AccessStore* store, Access* access)
       : options_(options), store_(store), access_(*access) {}
 
-  // Told of a prediction that is gone, on the thread that removes it, without a lock held; it may
-  // block. Call it before calls are served.
-  void set_on_prediction_removed(std::function<void(const std::string& id)> told) {
-    on_prediction_removed_ = std::move(told);
-  }
-
   const AccessOptions& options() const { return options_; }
   const Access& access() const { return access_; }
 
@@ -92,11 +86,6 @@ class AccessChanges {
     MutexLock lock(access_.mutex_);
     access_.index_.Add(record);
   }
-  // The prediction is to go to the PACS, so that bridges may look at it; or is so no longer.
-  void SetExported(const std::string& prediction, bool exported) {
-    MutexLock lock(access_.mutex_);
-    access_.index_.SetExported(prediction, exported);
-  }
   void SessionRemoved(const std::string& id);
   void PredictionRemoved(const std::string& id);
   void CaseRemoved(const CaseKey& key);
@@ -135,7 +124,6 @@ class AccessChanges {
   AccessStore* const store_;
   bool follows_ = false;  // constant once calls are served
   Access& access_;
-  std::function<void(const std::string&)> on_prediction_removed_ = [](const std::string&) {};
 
   Mutex learning_;                                                               // over ReloadRows
   std::vector<std::shared_ptr<Unseen>> unseen_ ABSL_GUARDED_BY(access_.mutex_);  // in their order

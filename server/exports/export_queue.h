@@ -39,13 +39,9 @@ class ExportQueue {
   ExportQueue(const ExportLimits& limits, ExportStore* store, UnixClock clock = SystemUnixSeconds)
       : limits_(limits), store_(*store), clock_(std::move(clock)) {}
 
-  // Before anything else. The first is told of every export that is new or changed, the second of a
-  // prediction that has an export now, or none any more.
+  // Before anything else. It is told of every export that is new or changed.
   void set_on_changed(std::function<void(const ExportRecord&)> on_changed) {
     on_changed_ = std::move(on_changed);
-  }
-  void set_on_exported(std::function<void(const std::string& prediction, bool exported)> told) {
-    on_exported_ = std::move(told);
   }
 
   // Where others write to the store as well: asked once for an id that is not known, without a lock
@@ -90,6 +86,11 @@ class ExportQueue {
   std::set<std::string> Waiting(const std::optional<std::string>& owner) const;
   int CountWaiting() const;
 
+  // Whether there is an export of the prediction, done or not.
+  bool IsExported(const std::string& prediction) const;
+  // Predictions with an export that were planned in the case.
+  std::set<std::string> ExportedOfCase(const std::string& case_sha256) const;
+
   struct Change {
     std::string etag = {};  // of the one that was seen; empty: any
     ExportState state = ExportState::kWaiting;
@@ -110,6 +111,8 @@ class ExportQueue {
   static std::string EtagOf(const ExportRecord& record);
 
  private:
+  using IdsOf = std::map<std::string, std::set<std::string>>;
+
   const ExportRecord* FindEarlier(const ExportRecord& wanted) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckRoom(const std::string& owner) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -117,9 +120,10 @@ class ExportQueue {
 
   absl::StatusOr<ExportRecord> FindKnown(const std::string& id) const;
   absl::Status Refresh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  void Index(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Into memory, and told.
   void Take(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
-  // Out of memory, and told.
+  // Out of memory.
   void Drop(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   absl::Status Keep(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   absl::Status Erase(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
@@ -129,8 +133,6 @@ class ExportQueue {
   ExportStore& store_;
   const UnixClock clock_;
   std::function<void(const ExportRecord&)> on_changed_ = [](const ExportRecord&) {};
-  std::function<void(const std::string&, bool)> on_exported_ = [](const std::string&, bool) {};
-
   std::function<absl::Status(const std::string&)> on_unknown_;  // empty: nobody else writes
 
   // Held over the store and over those who are told: changes come one after the other.
@@ -139,7 +141,8 @@ class ExportQueue {
   // After writing_, and over nothing else.
   mutable Mutex mutex_;
   std::map<std::string, ExportRecord> records_ ABSL_GUARDED_BY(mutex_);
-  std::map<std::string, std::set<std::string>> of_prediction_ ABSL_GUARDED_BY(mutex_);
+  IdsOf of_prediction_ ABSL_GUARDED_BY(mutex_);
+  IdsOf of_case_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, std::string> of_request_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -4,7 +4,6 @@
 #include "server/exports/export_queue.h"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -23,6 +22,8 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using Code = absl::StatusCode;
+
+const std::string kCase(64, 'c');
 
 // A store of which every call fails when it is told to.
 class BrokenStore final : public ExportStore {
@@ -45,11 +46,8 @@ class BrokenStore final : public ExportStore {
 class ExportQueueTest : public ::testing::Test {
  protected:
   void Open(std::vector<std::string> gone = {}) {
-    told_.clear();
     changes_ = 0;
     book_ = std::make_unique<ExportQueue>(limits_, &store_, [this] { return now_s_; });
-    book_->set_on_exported(
-        [this](const std::string& prediction, bool exported) { told_[prediction] = exported; });
     book_->set_on_changed([this](const ExportRecord& /*record*/) { ++changes_; });
     ASSERT_THAT(book_->LoadAll([&](const std::string& prediction) {
       return std::find(gone.begin(), gone.end(), prediction) == gone.end();
@@ -61,7 +59,7 @@ class ExportQueueTest : public ::testing::Test {
   absl::StatusOr<ExportRecord> Ask(const std::string& prediction, const std::string& owner = "ann",
                                    const std::string& key = "") {
     return book_->Create({.prediction = prediction,
-                          .case_sha256 = std::string(64, 'c'),
+                          .case_sha256 = kCase,
                           .owner = owner,
                           .request_key = key,
                           .request_fingerprint = key.empty() ? "" : prediction});
@@ -79,7 +77,6 @@ class ExportQueueTest : public ::testing::Test {
   std::unique_ptr<Stores> stores_ = *OpenInMemoryStores();
   std::unique_ptr<ExportStore> kept_ = OpenExportStore(stores_.get());
   BrokenStore store_{kept_.get()};
-  std::map<std::string, bool> told_;
   int changes_ = 0;
   std::unique_ptr<ExportQueue> book_;
 };
@@ -91,7 +88,8 @@ TEST_F(ExportQueueTest, AnotherBookOfTheStoreKnowsTheSame) {
   Open();
   ASSERT_OK_AND_ASSIGN(const ExportRecord found, book_->Find(made.id));
   EXPECT_EQ(found, changed);
-  EXPECT_TRUE(told_.at("p"));
+  EXPECT_TRUE(book_->IsExported("p"));
+  EXPECT_THAT(book_->ExportedOfCase(kCase), ElementsAre("p"));
   ASSERT_OK_AND_ASSIGN(const ExportRecord again, Ask("p", "ann", "key"));
   EXPECT_EQ(again.id, made.id);
 }
@@ -101,7 +99,7 @@ TEST_F(ExportQueueTest, WhatLostItsPredictionWhileNobodyLookedIsGone) {
   ASSERT_THAT(Ask("q"), IsOk());
   Open(/*gone=*/{"p"});
   EXPECT_THAT(Predictions({}), ElementsAre("q"));
-  EXPECT_FALSE(told_.contains("p"));
+  EXPECT_FALSE(book_->IsExported("p"));
   Open();
   EXPECT_THAT(Predictions({}), ElementsAre("q")) << "of the store, too";
 }
@@ -110,7 +108,7 @@ TEST_F(ExportQueueTest, NothingIsTheresThatWasNotKept) {
   store_.broken = true;
   EXPECT_THAT(Ask("p"), StatusIs(Code::kResourceExhausted));
   EXPECT_THAT(Predictions({}), IsEmpty());
-  EXPECT_FALSE(told_.contains("p"));
+  EXPECT_FALSE(book_->IsExported("p"));
   store_.broken = false;
   ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
   store_.broken = true;
@@ -132,14 +130,15 @@ TEST_F(ExportQueueTest, WhatAnotherServerHasChangedIsLearntAndTold) {
   const int before = changes_;
   ASSERT_THAT(book_->ReloadRows(), IsOk());
   EXPECT_EQ(changes_, before + 2) << "what has not changed is not told";
-  EXPECT_TRUE(told_.at("q"));
+  EXPECT_TRUE(book_->IsExported("q"));
   ASSERT_OK_AND_ASSIGN(const ExportRecord found, book_->Find(made.id));
   EXPECT_EQ(found, changed);
   ASSERT_THAT(kept_->Erase({made.id}), IsOk());
   ASSERT_THAT(book_->ReloadRows(), IsOk());
   EXPECT_THAT(book_->Find(made.id), StatusIs(Code::kNotFound));
-  EXPECT_FALSE(told_.at("p"));
-  EXPECT_TRUE(told_.at("r"));
+  EXPECT_FALSE(book_->IsExported("p"));
+  EXPECT_TRUE(book_->IsExported("r"));
+  EXPECT_THAT(book_->ExportedOfCase(kCase), ElementsAre("r"));
 }
 
 TEST_F(ExportQueueTest, WhatNobodyHereKnowsIsAskedForOnce) {
@@ -163,7 +162,8 @@ TEST_F(ExportQueueTest, WhatIsTakenBackOpensNothingWhateverTheDiskSays) {
   store_.broken = true;
   EXPECT_THAT(book_->Remove(made.id), StatusIs(Code::kResourceExhausted));
   EXPECT_THAT(book_->Find(made.id), StatusIs(Code::kNotFound));
-  EXPECT_FALSE(told_.at("p"));
+  EXPECT_FALSE(book_->IsExported("p"));
+  EXPECT_THAT(book_->ExportedOfCase(kCase), IsEmpty());
 }
 
 TEST_F(ExportQueueTest, APredictionIsExportedAsLongAsOneIsLeft) {
@@ -171,9 +171,11 @@ TEST_F(ExportQueueTest, APredictionIsExportedAsLongAsOneIsLeft) {
   ASSERT_THAT(book_->Update(first.id, {.state = ExportState::kFailed}), IsOk());
   ASSERT_OK_AND_ASSIGN(const ExportRecord second, Ask("p"));
   ASSERT_THAT(book_->Remove(first.id), IsOk());
-  EXPECT_TRUE(told_.at("p"));
+  EXPECT_TRUE(book_->IsExported("p"));
+  EXPECT_THAT(book_->ExportedOfCase(kCase), ElementsAre("p"));
   ASSERT_THAT(book_->Remove(second.id), IsOk());
-  EXPECT_FALSE(told_.at("p"));
+  EXPECT_FALSE(book_->IsExported("p"));
+  EXPECT_THAT(book_->ExportedOfCase(kCase), IsEmpty());
 }
 
 TEST_F(ExportQueueTest, IdsRiseThoughTheClockGoesBack) {
