@@ -3,9 +3,7 @@
 
 #pragma once
 
-#include <compare>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,6 +16,7 @@
 #include "core/base/mutex.h"
 #include "server/access/auth/identity.h"
 #include "server/access/resource_index.h"
+#include "server/access/row_reader.h"
 #include "server/access/share_table.h"
 #include "server/exports/export_queue.h"
 #include "server/store/session_store.h"
@@ -38,8 +37,8 @@ enum class Permission {
 // PermissionDenied is for what may be looked at only. What nobody with a name owns is open to those
 // without a name, and to them alone.
 //
-// Where several servers use one store, another may have made a moment ago what is not known here:
-// then, and then only, somebody is asked who reads that one row (set_on_unknown), which may take a
+// Where several servers use one store, another may have made a moment ago what is not known here.
+// Then, and only then, the store is asked for that one row (set_row_reader), which may take a
 // while.
 //
 // Thread-safe. Its lock is held over nothing but the look-ups in the exports.
@@ -49,22 +48,9 @@ class Access {
   explicit Access(UnixClock clock = SystemUnixSeconds, const ExportQueue* exports = nullptr)
       : clock_(std::move(clock)), exports_(exports) {}
 
-  // What is not known here.
-  struct Unknown {
-    enum class Kind { kSession, kPrediction, kCase, kMesh, kLink };
-
-    Kind kind = Kind::kSession;
-    std::string name = {};   // id, SHA-256 or digest
-    std::string owner = {};  // of a case or a right to a mesh
-
-    friend auto operator<=>(const Unknown&, const Unknown&) = default;
-  };
-  // Asked once for what a call names and nobody here knows, without a lock held, on the call's
-  // thread: tells AccessChanges of it where it is there. Errors: what the call is refused with
-  // where that cannot be found out. Call it before calls are served.
-  void set_on_unknown(std::function<absl::Status(const Unknown&)> on_unknown) {
-    on_unknown_ = std::move(on_unknown);
-  }
+  // Where several servers use one store: asked for what a call names and is not known here, on the
+  // call's thread. It must outlive the calls. Call it before calls are served.
+  void set_row_reader(RowReader* reader) { reader_ = reader; }
 
   // Whether the principal may call a method ("CaseService.UploadCase") at all: publishers publish,
   // and a follow link follows. Errors: PermissionDenied.
@@ -154,19 +140,20 @@ class Access {
   bool IsGood(const FollowLinkRow& link) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  // Have it looked for where it is not known.
-  absl::Status FetchIfMissing(Unknown::Kind kind, const std::string& name,
+  // Reads it from the store where it is not known. Errors: those of RowReader.
+  absl::Status FetchIfMissing(RowName::Kind kind, const std::string& name,
                               const std::string& owner = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
-  bool Knows(const Unknown& what) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool Knows(const RowName& row) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const UnixClock clock_;
-  const ExportQueue* const exports_;                        // null: nothing is exported
-  int64_t most_bytes_ = 0;                                  // of one principal
-  std::function<absl::Status(const Unknown&)> on_unknown_;  // empty: all that there is is known
+  const ExportQueue* const exports_;  // null: nothing is exported
+  int64_t most_bytes_ = 0;            // of one principal
+  RowReader* reader_ = nullptr;       // null: all that there is is known
 
   mutable Mutex mutex_;
-  ResourceIndex index_ ABSL_GUARDED_BY(mutex_);
-  ShareTable table_ ABSL_GUARDED_BY(mutex_);
+  // Mutable: a check adds what it has read from the store.
+  mutable ResourceIndex index_ ABSL_GUARDED_BY(mutex_);
+  mutable ShareTable table_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

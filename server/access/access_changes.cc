@@ -57,11 +57,6 @@ absl::Status AccessChanges::ReloadRows() {
   return absl::OkStatus();
 }
 
-void AccessChanges::OnRemoteChange(const AccessRows& rows) {
-  MutexLock lock(access_.mutex_);
-  access_.table_.Add(rows);
-}
-
 void AccessChanges::SessionGone(const std::string& id) {
   AccessRows rows;
   {
@@ -120,7 +115,7 @@ void AccessChanges::End(Unseen* unseen, bool kept) {
 
 absl::Status AccessChanges::FetchIfMissing(const Principal& caller,
                                            absl::string_view resource) const {
-  using Kind = Access::Unknown::Kind;
+  using Kind = RowName::Kind;
   if (absl::ConsumePrefix(&resource, kSessionsPrefix)) {
     return access_.FetchIfMissing(Kind::kSession, std::string(resource));
   }

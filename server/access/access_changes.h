@@ -43,8 +43,6 @@ class AccessChanges {
   // Takes what the store has in place of what was known. Blocks. Errors: those of
   // AccessStore::Load.
   absl::Status ReloadRows();
-  // Rows that others have put there.
-  void OnRemoteChange(const AccessRows& rows);
   // What others have deleted: their rows go by ReloadRows. What is known of a session's rows is
   // erased from the store, too: who deleted it may not have known all, and the next session of its
   // name is another's.

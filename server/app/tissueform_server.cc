@@ -203,6 +203,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   budget_.set_account_limit(MemoryQuota(options), [this](const std::string& owner, int64_t bytes) {
     ReclaimOf(owner, bytes);
   });
+  // The one circle of callbacks: sessions and meshes that leave return their memory to the budget
+  // that asks for it. It asks without a lock held.
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
   if (cluster_ != nullptr) {
     cluster_->Join({.access = &access_changes_,

@@ -124,7 +124,7 @@ std::string ExportQueue::NewId() {
 absl::StatusOr<ExportRecord> ExportQueue::Create(ExportRecord wanted) {
   MutexLock writing(writing_);
   // Another server may have had the same request.
-  if (on_unknown_) TF_RETURN_IF_ERROR(Refresh());
+  if (read_gate_) TF_RETURN_IF_ERROR(Refresh());
   {
     MutexLock lock(mutex_);
     if (const ExportRecord* earlier = FindEarlier(wanted); earlier != nullptr) {
@@ -168,14 +168,14 @@ void ExportQueue::Take(const ExportRecord& record) {
   on_changed_(record);
 }
 
-absl::StatusOr<ExportRecord> ExportQueue::Find(const std::string& id) const {
-  absl::StatusOr<ExportRecord> found = FindKnown(id);
-  if (found.ok() || !on_unknown_) return found;
-  TF_RETURN_IF_ERROR(on_unknown_(id));
-  return FindKnown(id);
+absl::StatusOr<ExportRecord> ExportQueue::FindOrRead(const std::string& id) {
+  absl::StatusOr<ExportRecord> found = Find(id);
+  if (found.ok() || !read_gate_) return found;
+  TF_RETURN_IF_ERROR(read_gate_(id, [this] { return ReloadRows(); }));
+  return Find(id);
 }
 
-absl::StatusOr<ExportRecord> ExportQueue::FindKnown(const std::string& id) const {
+absl::StatusOr<ExportRecord> ExportQueue::Find(const std::string& id) const {
   MutexLock lock(mutex_);
   const auto found = records_.find(id);
   if (found == records_.end()) return NoExport(id);
@@ -226,7 +226,7 @@ std::set<std::string> ExportQueue::ExportedOfCase(const std::string& case_sha256
 
 absl::StatusOr<ExportRecord> ExportQueue::Update(const std::string& id, const Change& change) {
   MutexLock writing(writing_);
-  TF_ASSIGN_OR_RETURN(ExportRecord record, FindKnown(id));
+  TF_ASSIGN_OR_RETURN(ExportRecord record, Find(id));
   if (!change.etag.empty() && change.etag != EtagOf(record)) return StaleExport(id);
   if (!MayFollow(record.state, change.state)) {
     return absl::InvalidArgumentError(
@@ -248,7 +248,7 @@ absl::StatusOr<ExportRecord> ExportQueue::Update(const std::string& id, const Ch
 
 absl::Status ExportQueue::Remove(const std::string& id) {
   MutexLock writing(writing_);
-  TF_RETURN_IF_ERROR(FindKnown(id).status());
+  TF_RETURN_IF_ERROR(Find(id).status());
   return Erase({id});
 }
 

@@ -44,11 +44,12 @@ class ExportQueue {
     on_changed_ = std::move(on_changed);
   }
 
-  // Where others write to the store as well: asked once for an id that is not known, without a lock
-  // held; calls ReloadRows. Errors: what Find answers where that is not possible.
-  void set_on_unknown(std::function<absl::Status(const std::string& id)> on_unknown) {
-    on_unknown_ = std::move(on_unknown);
-  }
+  // Where others write to the store as well: decides whether the store is asked for an id that is
+  // not known, and calls `read` then, at most once; without a lock held. Errors: what FindOrRead
+  // answers where it cannot be found out. Before anything else.
+  using ReadGate =
+      std::function<absl::Status(const std::string& id, const std::function<absl::Status()>& read)>;
+  void set_read_gate(ReadGate gate) { read_gate_ = std::move(gate); }
 
   const ExportLimits& limits() const { return limits_; }
 
@@ -67,8 +68,11 @@ class ExportQueue {
   // ExportStore.
   absl::StatusOr<ExportRecord> Create(ExportRecord wanted);
 
-  // Errors: NotFound, those of set_on_unknown.
+  // By what is known here. Never blocks. Errors: NotFound.
   absl::StatusOr<ExportRecord> Find(const std::string& id) const;
+  // The same, but asks the store where it is not known and others write to it. Not from
+  // set_on_changed. Errors: NotFound, those of set_read_gate.
+  absl::StatusOr<ExportRecord> FindOrRead(const std::string& id);
 
   struct ListRequest {
     std::optional<std::string> owner = {};        // of this one only; unset: of all
@@ -118,7 +122,6 @@ class ExportQueue {
   absl::Status CheckRoom(const std::string& owner) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::string NewId() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  absl::StatusOr<ExportRecord> FindKnown(const std::string& id) const;
   absl::Status Refresh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   void Index(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Into memory, and told.
@@ -133,7 +136,7 @@ class ExportQueue {
   ExportStore& store_;
   const UnixClock clock_;
   std::function<void(const ExportRecord&)> on_changed_ = [](const ExportRecord&) {};
-  std::function<absl::Status(const std::string&)> on_unknown_;  // empty: nobody else writes
+  ReadGate read_gate_;  // empty: nobody else writes
 
   // Held over the store and over those who are told: changes come one after the other.
   Mutex writing_;

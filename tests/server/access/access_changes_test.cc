@@ -289,18 +289,27 @@ TEST_F(FollowingAccessChangesTest, WhatOneServerGivesWhileAnotherDeletesTheSessi
   EXPECT_FALSE(BobMayLook());
 }
 
+// Has the session "t" of ann's; does not answer for "away".
+class ShownRows final : public RowReader {
+ public:
+  absl::StatusOr<FoundRows> ReadRow(const RowName& row) override {
+    asked.push_back(row);
+    if (row.name == "away") return absl::UnavailableError("the store is away");
+    FoundRows found;
+    if (row.name != "t") return found;
+    found.session.emplace();
+    found.session->id = "t";
+    found.session->owner = "ann";
+    return found;
+  }
+
+  std::vector<RowName> asked;
+};
+
 TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBeforeItIsRefused) {
-  std::vector<Access::Unknown> asked;
-  access_.set_on_unknown([&](const Access::Unknown& what) {
-    asked.push_back(what);
-    if (what.name == "away") return absl::UnavailableError("the store is away");
-    if (what.name != "t") return absl::OkStatus();
-    SessionRecord session;
-    session.id = "t";
-    session.owner = "ann";
-    changes_.Added(session);
-    return absl::OkStatus();
-  });
+  ShownRows rows;
+  access_.set_row_reader(&rows);
+  const std::vector<RowName>& asked = rows.asked;
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "t", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "t", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kRead), StatusIs(Code::kNotFound));

@@ -4,6 +4,7 @@
 #include "server/exports/export_queue.h"
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -143,18 +144,33 @@ TEST_F(ExportQueueTest, WhatAnotherServerHasChangedIsLearntAndTold) {
 
 TEST_F(ExportQueueTest, WhatNobodyHereKnowsIsAskedForOnce) {
   int asked = 0;
-  book_->set_on_unknown([&](const std::string& /*id*/) {
+  book_->set_read_gate([&](const std::string& /*id*/, const std::function<absl::Status()>& read) {
     ++asked;
-    return book_->ReloadRows();
+    return read();
   });
   ASSERT_THAT(kept_->Put({.id = "other", .prediction = "q", .owner = "bob"}), IsOk());
-  EXPECT_THAT(book_->Find("other"), IsOk());
-  EXPECT_THAT(book_->Find("other"), IsOk());
+  EXPECT_THAT(book_->Find("other"), StatusIs(Code::kNotFound)) << "not known here yet";
+  EXPECT_THAT(book_->FindOrRead("other"), IsOk());
+  EXPECT_THAT(book_->FindOrRead("other"), IsOk());
   EXPECT_EQ(asked, 1);
-  EXPECT_THAT(book_->Find("nowhere"), StatusIs(Code::kNotFound));
+  EXPECT_THAT(book_->FindOrRead("nowhere"), StatusIs(Code::kNotFound));
   EXPECT_EQ(asked, 2);
   ASSERT_OK_AND_ASSIGN(const ExportRecord same, Ask("q", "bob"));
   EXPECT_EQ(same.id, "other") << "one that is not done is given again, whoever has made it";
+}
+
+// A watch looks up an export that was taken back while it is told of another. Where the look-up
+// asked the store it would wait for itself.
+TEST_F(ExportQueueTest, WhoIsToldOfOneFindsThatAnotherIsGoneWithoutTheStore) {
+  ASSERT_OK_AND_ASSIGN(const ExportRecord gone, Ask("p"));
+  book_->set_read_gate(
+      [](const std::string& /*id*/, const std::function<absl::Status()>& read) { return read(); });
+  absl::Status found;
+  book_->set_on_changed(
+      [&](const ExportRecord& /*record*/) { found = book_->Find(gone.id).status(); });
+  ASSERT_THAT(book_->Remove(gone.id), IsOk());
+  ASSERT_THAT(Ask("q"), IsOk());
+  EXPECT_THAT(found, StatusIs(Code::kNotFound));
 }
 
 TEST_F(ExportQueueTest, WhatIsTakenBackOpensNothingWhateverTheDiskSays) {
