@@ -31,6 +31,12 @@ constexpr std::array<std::string_view, 9> kOpenToLinks = {
 bool IsBridge(const Principal& caller) { return caller.roles.contains("bridge"); }
 bool IsLink(const Principal& caller) { return !caller.only_session.empty(); }
 
+void Append(const AccessRows& rows, AccessRows* all) {
+  all->shares.insert(all->shares.end(), rows.shares.begin(), rows.shares.end());
+  all->links.insert(all->links.end(), rows.links.begin(), rows.links.end());
+  all->mesh_rights.insert(all->mesh_rights.end(), rows.mesh_rights.begin(), rows.mesh_rights.end());
+}
+
 absl::Status LinkHasEnded() {
   return absl::UnauthenticatedError(
       "the follow link has expired or was revoked; ask its sender for a new one");
@@ -176,6 +182,7 @@ absl::Status Access::FetchIfMissing(RowName::Kind kind, const std::string& name,
   if (found.prediction.has_value()) index_.Add(*found.prediction);
   if (found.of_case.has_value()) index_.Add(*found.of_case);
   table_.Add(found.access);
+  Append(found.access, &fetched_);
   return absl::OkStatus();
 }
 
@@ -336,6 +343,15 @@ bool Access::HasGoodLink(const std::string& session) const {
 absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const {
   TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kLink, digest));
   MutexLock lock(mutex_);
+  return GoodLink(digest);
+}
+
+absl::Status Access::RecheckLink(const std::string& digest) const {
+  MutexLock lock(mutex_);
+  return GoodLink(digest).status();
+}
+
+absl::StatusOr<FollowLinkRow> Access::GoodLink(const std::string& digest) const {
   const FollowLinkRow* link = table_.FindLink(digest);
   if (link == nullptr || !IsGood(*link)) return LinkHasEnded();
   return *link;

@@ -97,6 +97,9 @@ class Access {
   // A link that is good: neither expired nor taken back, and its maker may still drag the session.
   // Errors: Unauthenticated.
   absl::StatusOr<FollowLinkRow> FindLink(const std::string& digest) const;
+  // Whether a link that was found is still good. Never blocks, not even where several servers use
+  // one store. Errors: Unauthenticated.
+  absl::Status RecheckLink(const std::string& digest) const;
 
   // What is kept, by owner; a mesh is held by each of those who have sent it.
   using Holdings = ResourceIndex::Holdings;
@@ -137,6 +140,8 @@ class Access {
                                    Permission need) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<CaseKey> CaseOfLink(const Principal& link, const std::string& sha256) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::StatusOr<FollowLinkRow> GoodLink(const std::string& digest) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool IsGood(const FollowLinkRow& link) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
@@ -154,6 +159,9 @@ class Access {
   // Mutable: a check adds what it has read from the store.
   mutable ResourceIndex index_ ABSL_GUARDED_BY(mutex_);
   mutable ShareTable table_ ABSL_GUARDED_BY(mutex_);
+  // Read one by one since AccessChanges::ReloadRows has begun for the last time: what it has read
+  // by then may lack them.
+  mutable AccessRows fetched_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

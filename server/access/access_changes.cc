@@ -42,12 +42,14 @@ absl::Status AccessChanges::ReloadRows() {
   {
     MutexLock lock(access_.mutex_);
     std::erase_if(unseen_, [](const auto& unseen) { return unseen->ended; });
+    access_.fetched_ = {};
   }
   TF_ASSIGN_OR_RETURN(const AccessRows rows, store_->Load());
   {
     ShareTable table;
     table.Add(rows);
     MutexLock lock(access_.mutex_);
+    table.Add(access_.fetched_);
     for (const auto& unseen : unseen_) {
       table.Remove(unseen->erased);
       if (unseen->kept) table.Add(unseen->put);

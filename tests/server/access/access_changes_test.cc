@@ -289,14 +289,21 @@ TEST_F(FollowingAccessChangesTest, WhatOneServerGivesWhileAnotherDeletesTheSessi
   EXPECT_FALSE(BobMayLook());
 }
 
-// Has the session "t" of ann's; does not answer for "away".
+// Has the session "t" of ann's and a link to it, "l"; does not answer for "away".
 class ShownRows final : public RowReader {
  public:
   absl::StatusOr<FoundRows> ReadRow(const RowName& row) override {
     asked.push_back(row);
     if (row.name == "away") return absl::UnavailableError("the store is away");
     FoundRows found;
-    if (row.name != "t") return found;
+    if (row.name == "l") {
+      found.access.links = {{.digest = "l",
+                             .session = "t",
+                             .maker = "ann",
+                             .expires_s = std::numeric_limits<int64_t>::max()}};
+    } else if (row.name != "t") {
+      return found;
+    }
     found.session.emplace();
     found.session->id = "t";
     found.session->owner = "ann";
@@ -325,6 +332,19 @@ TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBefore
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "away", Permission::kRead),
               StatusIs(Code::kUnavailable))
       << "nobody knows that it is not there";
+}
+
+TEST_F(FollowingAccessChangesTest, ALinkThatIsFoundWhileAllIsReadStaysAndIsNotLookedForAgain) {
+  ShownRows rows;
+  access_.set_row_reader(&rows);
+  EXPECT_THAT(access_.RecheckLink("l"), StatusIs(Code::kUnauthenticated));
+  EXPECT_THAT(rows.asked, IsEmpty()) << "a call that lasts does not wait for the store";
+  store_.AfterReading([this] { EXPECT_THAT(access_.FindLink("l"), IsOk()); });
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
+  EXPECT_THAT(access_.RecheckLink("l"), IsOk());
+  EXPECT_THAT(rows.asked, SizeIs(1));
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
+  EXPECT_THAT(access_.RecheckLink("l"), StatusIs(Code::kUnauthenticated)) << "it was taken back";
 }
 
 }  // namespace
