@@ -31,6 +31,12 @@ constexpr std::array<std::string_view, 9> kOpenToLinks = {
 bool IsBridge(const Principal& caller) { return caller.roles.contains("bridge"); }
 bool IsLink(const Principal& caller) { return !caller.only_session.empty(); }
 
+void Append(const AccessRows& rows, AccessRows* all) {
+  all->shares.insert(all->shares.end(), rows.shares.begin(), rows.shares.end());
+  all->links.insert(all->links.end(), rows.links.begin(), rows.links.end());
+  all->mesh_rights.insert(all->mesh_rights.end(), rows.mesh_rights.begin(), rows.mesh_rights.end());
+}
+
 absl::Status LinkHasEnded() {
   return absl::UnauthenticatedError(
       "the follow link has expired or was revoked; ask its sender for a new one");
@@ -105,7 +111,7 @@ Access::Level Access::PredictionLevel(const Principal& caller, const std::string
   if (table_.RoleOf(prediction->owner, PredictionResource(id), caller.name).has_value()) {
     return Level::kRead;
   }
-  if (IsBridge(caller) && index_.IsExported(id)) return Level::kRead;
+  if (IsBridge(caller) && exports_ != nullptr && exports_->IsExported(id)) return Level::kRead;
   // Only of one owner: an id of a session may have become another's meanwhile.
   const ResourceIndex::Session* session = index_.FindSession(prediction->session);
   if (session == nullptr || session->owner != prediction->owner) return Level::kNothing;
@@ -113,9 +119,12 @@ Access::Level Access::PredictionLevel(const Principal& caller, const std::string
 }
 
 bool Access::IsExportedCase(const CaseKey& key) const {
-  for (const std::string& id : index_.ExportedOfCase(key.sha256)) {
+  if (exports_ == nullptr) return false;
+  for (const std::string& id : exports_->ExportedOfCase(key.sha256)) {
+    const ResourceIndex::Prediction* prediction = index_.FindPrediction(id);
+    if (prediction == nullptr) continue;
     // Whoever names a case that is not open to them opens it to no bridge.
-    const Principal planner{.name = index_.FindPrediction(id)->owner};
+    const Principal planner{.name = prediction->owner};
     if (CaseLevel(planner, key) >= Level::kRead) return true;
   }
   return false;
@@ -143,44 +152,63 @@ Access::Level Access::MeshLevel(const Principal& caller, const std::string& sha2
   return Level::kNothing;
 }
 
-bool Access::Knows(const Unknown& what) const {
-  switch (what.kind) {
-    case Unknown::Kind::kSession:
-      return index_.FindSession(what.name) != nullptr;
-    case Unknown::Kind::kPrediction:
-      return index_.FindPrediction(what.name) != nullptr;
-    case Unknown::Kind::kCase:
-      return index_.FindCase({.sha256 = what.name, .owner = what.owner}) != nullptr;
-    case Unknown::Kind::kMesh:
-      return table_.HasMesh(what.owner, what.name);
-    case Unknown::Kind::kLink:
-      return table_.FindLink(what.name) != nullptr;
+bool Access::Knows(const RowName& row) const {
+  switch (row.kind) {
+    case RowName::Kind::kSession:
+      return index_.FindSession(row.name) != nullptr;
+    case RowName::Kind::kPrediction:
+      return index_.FindPrediction(row.name) != nullptr;
+    case RowName::Kind::kCase:
+      return index_.FindCase({.sha256 = row.name, .owner = row.owner}) != nullptr;
+    case RowName::Kind::kMesh:
+      return table_.HasMesh(row.owner, row.name);
+    case RowName::Kind::kLink:
+      return table_.FindLink(row.name) != nullptr;
   }
   return true;
 }
 
-absl::Status Access::FetchIfMissing(Unknown::Kind kind, const std::string& name,
+absl::Status Access::FetchIfMissing(RowName::Kind kind, const std::string& name,
                                     const std::string& owner) const {
-  if (!on_unknown_) return absl::OkStatus();
-  const Unknown what = {.kind = kind, .name = name, .owner = owner};
+  if (reader_ == nullptr) return absl::OkStatus();
+  const RowName row = {.kind = kind, .name = name, .owner = owner};
   {
     MutexLock lock(mutex_);
-    if (Knows(what)) return absl::OkStatus();
+    if (Knows(row)) return absl::OkStatus();
   }
-  return on_unknown_(what);
+  TF_ASSIGN_OR_RETURN(const FoundRows found, reader_->ReadRow(row));
+  MutexLock lock(mutex_);
+  if (found.session.has_value()) index_.Add(*found.session);
+  if (found.prediction.has_value()) index_.Add(*found.prediction);
+  if (found.of_case.has_value()) index_.Add(*found.of_case);
+  table_.Add(found.access);
+  Append(found.access, &fetched_);
+  return absl::OkStatus();
 }
 
 absl::Status Access::CheckSessionAccess(const Principal& caller, const std::string& id,
                                         Permission need) const {
-  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kSession, id));
+  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kSession, id));
   MutexLock lock(mutex_);
+  return JudgeSession(caller, id, need);
+}
+
+absl::Status Access::RecheckSessionAccess(const Principal& caller, const std::string& id,
+                                          Permission need) const {
+  MutexLock lock(mutex_);
+  if (index_.FindSession(id) == nullptr) return absl::OkStatus();
+  return JudgeSession(caller, id, need);
+}
+
+absl::Status Access::JudgeSession(const Principal& caller, const std::string& id,
+                                  Permission need) const {
   if (caller.only_session == SessionResource(id) && !HasGoodLink(id)) return LinkHasEnded();
   return Judge(SessionLevel(caller, id), need, NoSuchSession(id));
 }
 
 absl::Status Access::CheckPredictionAccess(const Principal& caller, const std::string& id,
                                            Permission need) const {
-  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kPrediction, id));
+  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kPrediction, id));
   MutexLock lock(mutex_);
   return Judge(PredictionLevel(caller, id), need, NoPrediction(id));
 }
@@ -193,7 +221,7 @@ absl::StatusOr<CaseKey> Access::CheckCaseAccess(const Principal& caller, const s
   };
   absl::StatusOr<CaseKey> first = found();
   if (first.ok() || IsLink(caller)) return first;
-  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kCase, sha256, caller.name));
+  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kCase, sha256, caller.name));
   return found();
 }
 
@@ -245,7 +273,7 @@ absl::Status Access::CheckMeshAccess(const Principal& caller, const std::string&
   };
   const absl::Status first = judged();
   if (first.ok() || IsLink(caller)) return first;
-  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kMesh, sha256, caller.name));
+  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kMesh, sha256, caller.name));
   return judged();
 }
 
@@ -313,8 +341,17 @@ bool Access::HasGoodLink(const std::string& session) const {
 }
 
 absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const {
-  TF_RETURN_IF_ERROR(FetchIfMissing(Unknown::Kind::kLink, digest));
+  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kLink, digest));
   MutexLock lock(mutex_);
+  return GoodLink(digest);
+}
+
+absl::Status Access::RecheckLink(const std::string& digest) const {
+  MutexLock lock(mutex_);
+  return GoodLink(digest).status();
+}
+
+absl::StatusOr<FollowLinkRow> Access::GoodLink(const std::string& digest) const {
   const FollowLinkRow* link = table_.FindLink(digest);
   if (link == nullptr || !IsGood(*link)) return LinkHasEnded();
   return *link;
@@ -345,13 +382,13 @@ absl::Status Access::CheckStorageQuota(const Principal& caller, int64_t bytes) c
 }
 
 bool Access::KnowsSession(const std::string& id) const {
-  FetchIfMissing(Unknown::Kind::kSession, id).IgnoreError();
+  FetchIfMissing(RowName::Kind::kSession, id).IgnoreError();
   MutexLock lock(mutex_);
   return index_.FindSession(id) != nullptr;
 }
 
 bool Access::KnowsPrediction(const std::string& id) const {
-  FetchIfMissing(Unknown::Kind::kPrediction, id).IgnoreError();
+  FetchIfMissing(RowName::Kind::kPrediction, id).IgnoreError();
   MutexLock lock(mutex_);
   return index_.FindPrediction(id) != nullptr;
 }

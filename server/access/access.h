@@ -3,9 +3,7 @@
 
 #pragma once
 
-#include <compare>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,7 +16,9 @@
 #include "core/base/mutex.h"
 #include "server/access/auth/identity.h"
 #include "server/access/resource_index.h"
+#include "server/access/row_reader.h"
 #include "server/access/share_table.h"
+#include "server/exports/export_queue.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
@@ -37,31 +37,20 @@ enum class Permission {
 // PermissionDenied is for what may be looked at only. What nobody with a name owns is open to those
 // without a name, and to them alone.
 //
-// Where several servers use one store, another may have made a moment ago what is not known here:
-// then, and then only, somebody is asked who reads that one row (set_on_unknown), which may take a
+// Where several servers use one store, another may have made a moment ago what is not known here.
+// Then, and only then, the store is asked for that one row (set_row_reader), which may take a
 // while.
 //
-// Thread-safe. Its lock is held over nothing else.
+// Thread-safe. Its lock is held over nothing but the look-ups in the exports.
 class Access {
  public:
-  explicit Access(UnixClock clock = SystemUnixSeconds) : clock_(std::move(clock)) {}
+  // `exports`, which must outlive it, says what is to go to the PACS; null: nothing is.
+  explicit Access(UnixClock clock = SystemUnixSeconds, const ExportQueue* exports = nullptr)
+      : clock_(std::move(clock)), exports_(exports) {}
 
-  // What is not known here.
-  struct Unknown {
-    enum class Kind { kSession, kPrediction, kCase, kMesh, kLink };
-
-    Kind kind = Kind::kSession;
-    std::string name = {};   // id, SHA-256 or digest
-    std::string owner = {};  // of a case or a right to a mesh
-
-    friend auto operator<=>(const Unknown&, const Unknown&) = default;
-  };
-  // Asked once for what a call names and nobody here knows, without a lock held, on the call's
-  // thread: tells AccessChanges of it where it is there. Errors: what the call is refused with
-  // where that cannot be found out. Call it before calls are served.
-  void set_on_unknown(std::function<absl::Status(const Unknown&)> on_unknown) {
-    on_unknown_ = std::move(on_unknown);
-  }
+  // Where several servers use one store: asked for what a call names and is not known here, on the
+  // call's thread. It must outlive the calls. Call it before calls are served.
+  void set_row_reader(RowReader* reader) { reader_ = reader; }
 
   // Whether the principal may call a method ("CaseService.UploadCase") at all: publishers publish,
   // and a follow link follows. Errors: PermissionDenied.
@@ -73,6 +62,11 @@ class Access {
   // Errors: NotFound, PermissionDenied; Unauthenticated for a follow link that has ended.
   absl::Status CheckSessionAccess(const Principal& caller, const std::string& id,
                                   Permission need) const;
+  // As CheckSessionAccess, for a call that lasts and was allowed when it began. Never blocks, not
+  // even where several servers use one store. OK for a session that is gone: what uses it ends with
+  // the reason for that.
+  absl::Status RecheckSessionAccess(const Principal& caller, const std::string& id,
+                                    Permission need) const;
   absl::Status CheckPredictionAccess(const Principal& caller, const std::string& id,
                                      Permission need) const;
   // Whose case the caller's name of it means: its own, else the first that it may look at.
@@ -103,6 +97,9 @@ class Access {
   // A link that is good: neither expired nor taken back, and its maker may still drag the session.
   // Errors: Unauthenticated.
   absl::StatusOr<FollowLinkRow> FindLink(const std::string& digest) const;
+  // Whether a link that was found is still good. Never blocks, not even where several servers use
+  // one store. Errors: Unauthenticated.
+  absl::Status RecheckLink(const std::string& digest) const;
 
   // What is kept, by owner; a mesh is held by each of those who have sent it.
   using Holdings = ResourceIndex::Holdings;
@@ -124,6 +121,8 @@ class Access {
 
   static absl::Status Judge(Level level, Permission need, const absl::Status& not_found);
   // All with the lock.
+  absl::Status JudgeSession(const Principal& caller, const std::string& id, Permission need) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Level LevelOfShare(const std::string& owner, const std::string& resource,
                      const std::string& project, const std::string& principal) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -141,21 +140,28 @@ class Access {
                                    Permission need) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<CaseKey> CaseOfLink(const Principal& link, const std::string& sha256) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::StatusOr<FollowLinkRow> GoodLink(const std::string& digest) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool IsGood(const FollowLinkRow& link) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool HasGoodLink(const std::string& session) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  // Have it looked for where it is not known.
-  absl::Status FetchIfMissing(Unknown::Kind kind, const std::string& name,
+  // Reads it from the store where it is not known. Errors: those of RowReader.
+  absl::Status FetchIfMissing(RowName::Kind kind, const std::string& name,
                               const std::string& owner = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
-  bool Knows(const Unknown& what) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool Knows(const RowName& row) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const UnixClock clock_;
-  int64_t most_bytes_ = 0;                                  // of one principal
-  std::function<absl::Status(const Unknown&)> on_unknown_;  // empty: all that there is is known
+  const ExportQueue* const exports_;  // null: nothing is exported
+  int64_t most_bytes_ = 0;            // of one principal
+  RowReader* reader_ = nullptr;       // null: all that there is is known
 
   mutable Mutex mutex_;
-  ResourceIndex index_ ABSL_GUARDED_BY(mutex_);
-  ShareTable table_ ABSL_GUARDED_BY(mutex_);
+  // Mutable: a check adds what it has read from the store.
+  mutable ResourceIndex index_ ABSL_GUARDED_BY(mutex_);
+  mutable ShareTable table_ ABSL_GUARDED_BY(mutex_);
+  // Read one by one since AccessChanges::ReloadRows has begun for the last time: what it has read
+  // by then may lack them.
+  mutable AccessRows fetched_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace tissueform

@@ -42,25 +42,21 @@ absl::Status AccessChanges::ReloadRows() {
   {
     MutexLock lock(access_.mutex_);
     std::erase_if(unseen_, [](const auto& unseen) { return unseen->ended; });
+    access_.fetched_ = {};
   }
   TF_ASSIGN_OR_RETURN(const AccessRows rows, store_->Load());
   {
     ShareTable table;
     table.Add(rows);
     MutexLock lock(access_.mutex_);
+    table.Add(access_.fetched_);
     for (const auto& unseen : unseen_) {
       table.Remove(unseen->erased);
       if (unseen->kept) table.Add(unseen->put);
     }
     access_.table_ = std::move(table);
   }
-  on_revoked_();
   return absl::OkStatus();
-}
-
-void AccessChanges::OnRemoteChange(const AccessRows& rows) {
-  MutexLock lock(access_.mutex_);
-  access_.table_.Add(rows);
 }
 
 void AccessChanges::SessionGone(const std::string& id) {
@@ -121,7 +117,7 @@ void AccessChanges::End(Unseen* unseen, bool kept) {
 
 absl::Status AccessChanges::FetchIfMissing(const Principal& caller,
                                            absl::string_view resource) const {
-  using Kind = Access::Unknown::Kind;
+  using Kind = RowName::Kind;
   if (absl::ConsumePrefix(&resource, kSessionsPrefix)) {
     return access_.FetchIfMissing(Kind::kSession, std::string(resource));
   }
@@ -178,11 +174,7 @@ void AccessChanges::Share(const Principal& caller, ShareRow share, const Done& d
     return;
   }
   share.owner = caller.name;
-  const bool lessens = share.role == ShareRole::kViewer;
-  Put({.shares = {std::move(share)}}, [this, done, lessens](const absl::Status& status) {
-    if (status.ok() && lessens) on_revoked_();
-    done(status);
-  });
+  Put({.shares = {std::move(share)}}, done);
 }
 
 void AccessChanges::Unshare(const Principal& caller, const std::string& resource,
@@ -200,7 +192,6 @@ void AccessChanges::Unshare(const Principal& caller, const std::string& resource
     return;
   }
   Erase({.shares = {{.resource = resource, .owner = caller.name, .principal = with}}}, done);
-  on_revoked_();
 }
 
 absl::StatusOr<std::vector<ShareRow>> AccessChanges::SharesOf(const Principal& caller,
@@ -262,7 +253,6 @@ void AccessChanges::RemoveLinks(const Principal& caller, const std::string& sess
     }
   }
   Erase(std::move(rows), done);
-  on_revoked_();
 }
 
 absl::Status AccessChanges::GrantMesh(const Principal& caller, const std::string& sha256,
@@ -300,7 +290,6 @@ void AccessChanges::PredictionRemoved(const std::string& id) {
     access_.index_.RemovePrediction(id);
   }
   Erase(std::move(rows), WarnUnlessErased);
-  on_prediction_removed_(id);
 }
 
 void AccessChanges::CaseRemoved(const CaseKey& key) {

@@ -30,16 +30,6 @@ class AccessChanges {
   AccessChanges(const AccessOptions& options, AccessStore* store, Access* access)
       : options_(options), store_(store), access_(*access) {}
 
-  // Told when somebody may less than before, from any thread, without a lock held: whoever has
-  // streams asks again for each. Call it before calls are served.
-  void set_on_revoked(std::function<void()> on_revoked) { on_revoked_ = std::move(on_revoked); }
-
-  // Told of a prediction that is gone, on the thread that removes it, without a lock held; it may
-  // block. Call it before calls are served.
-  void set_on_prediction_removed(std::function<void(const std::string& id)> told) {
-    on_prediction_removed_ = std::move(told);
-  }
-
   const AccessOptions& options() const { return options_; }
   const Access& access() const { return access_; }
 
@@ -53,8 +43,6 @@ class AccessChanges {
   // Takes what the store has in place of what was known. Blocks. Errors: those of
   // AccessStore::Load.
   absl::Status ReloadRows();
-  // Rows that others have put there.
-  void OnRemoteChange(const AccessRows& rows);
   // What others have deleted: their rows go by ReloadRows. What is known of a session's rows is
   // erased from the store, too: who deleted it may not have known all, and the next session of its
   // name is another's.
@@ -96,11 +84,6 @@ class AccessChanges {
     MutexLock lock(access_.mutex_);
     access_.index_.Add(record);
   }
-  // The prediction is to go to the PACS, so that bridges may look at it; or is so no longer.
-  void SetExported(const std::string& prediction, bool exported) {
-    MutexLock lock(access_.mutex_);
-    access_.index_.SetExported(prediction, exported);
-  }
   void SessionRemoved(const std::string& id);
   void PredictionRemoved(const std::string& id);
   void CaseRemoved(const CaseKey& key);
@@ -139,8 +122,6 @@ class AccessChanges {
   AccessStore* const store_;
   bool follows_ = false;  // constant once calls are served
   Access& access_;
-  std::function<void()> on_revoked_ = [] {};
-  std::function<void(const std::string&)> on_prediction_removed_ = [](const std::string&) {};
 
   Mutex learning_;                                                               // over ReloadRows
   std::vector<std::shared_ptr<Unseen>> unseen_ ABSL_GUARDED_BY(access_.mutex_);  // in their order

@@ -67,7 +67,7 @@ absl::StatusOr<Authenticated> LinkAuthenticator::Authenticate(const Credentials&
 absl::Status LinkAuthenticator::IsStillAuthorized(const Authenticated& authenticated) {
   if (authenticated.principal->only_session.empty())
     return others_->IsStillAuthorized(authenticated);
-  return access_->FindLink(authenticated.token_id).status();
+  return access_->RecheckLink(authenticated.token_id);
 }
 
 }  // namespace tissueform

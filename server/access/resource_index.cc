@@ -30,7 +30,6 @@ void ResourceIndex::Add(const PredictionRecord& record) {
       .owner = record.owner,
       .session = record.session,
       .mesh = record.mesh_sha256,
-      .case_sha256 = record.case_sha256,
       .bytes = kVertexBytes * record.vertex_count + static_cast<int64_t>(record.metadata.size())};
   predictions_of_mesh_[record.mesh_sha256].insert(record.id);
   Hold(record.owner, 0, predictions_[record.id].bytes);
@@ -53,7 +52,6 @@ void ResourceIndex::RemoveSession(const std::string& id) {
 void ResourceIndex::RemovePrediction(const std::string& id) {
   const auto found = predictions_.find(id);
   if (found == predictions_.end()) return;
-  SetExported(id, false);
   Forget(&predictions_of_mesh_, found->second.mesh, id);
   Hold(found->second.owner, 0, -found->second.bytes);
   predictions_.erase(found);
@@ -73,18 +71,6 @@ void ResourceIndex::Hold(const std::string& owner, int64_t sessions, int64_t byt
   if (holdings.sessions == 0 && holdings.bytes == 0) holdings_.erase(owner);
 }
 
-void ResourceIndex::SetExported(const std::string& prediction, bool exported) {
-  const auto found = predictions_.find(prediction);
-  if (found == predictions_.end() || exported == exported_.contains(prediction)) return;
-  if (exported) {
-    exported_.insert(prediction);
-    exported_of_case_[found->second.case_sha256].insert(prediction);
-  } else {
-    exported_.erase(prediction);
-    Forget(&exported_of_case_, found->second.case_sha256, prediction);
-  }
-}
-
 const ResourceIndex::Session* ResourceIndex::FindSession(const std::string& id) const {
   return FindIn(sessions_, id);
 }
@@ -100,10 +86,6 @@ const std::set<std::string>& ResourceIndex::SessionsOf(const std::string& mesh) 
 }
 const std::set<std::string>& ResourceIndex::PredictionsOf(const std::string& mesh) const {
   return Of(predictions_of_mesh_, mesh);
-}
-
-const std::set<std::string>& ResourceIndex::ExportedOfCase(const std::string& sha256) const {
-  return Of(exported_of_case_, sha256);
 }
 
 void ResourceIndex::Forget(NamesOf* names, const std::string& of, const std::string& id) {

@@ -26,7 +26,6 @@ class ResourceIndex {
     std::string owner = {};
     std::string session = {};  // that it was made in; it may be gone, or be another's by now
     std::string mesh = {};
-    std::string case_sha256 = {};
     int64_t bytes = 0;
   };
   struct Case {
@@ -40,13 +39,6 @@ class ResourceIndex {
   void RemoveSession(const std::string& id);
   void RemovePrediction(const std::string& id);
   void RemoveCase(const CaseKey& key);
-
-  // Bridges may look at what a prediction holds that is to go to the PACS. Nothing where there is
-  // no such prediction.
-  void SetExported(const std::string& prediction, bool exported);
-  bool IsExported(const std::string& prediction) const { return exported_.contains(prediction); }
-  // Those that were planned in the case.
-  const std::set<std::string>& ExportedOfCase(const std::string& sha256) const;
 
   // Null where there is none.
   const Session* FindSession(const std::string& id) const;
@@ -80,8 +72,6 @@ class ResourceIndex {
   std::map<CaseKey, Case> cases_;
   NamesOf sessions_of_mesh_;
   NamesOf predictions_of_mesh_;
-  std::set<std::string> exported_;  // predictions
-  NamesOf exported_of_case_;
   std::map<std::string, Holdings> holdings_;  // by owner
 };
 

@@ -128,10 +128,10 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
 absl::Status TissueformServer::LoadIndex() {
   TF_RETURN_IF_ERROR(access_changes_.LoadAll());
   TF_RETURN_IF_ERROR(NotifyExisting(stores_.get(), &access_changes_));
+  // Another server may have made a prediction since; what is not known to be gone stays.
   TF_RETURN_IF_ERROR(exports_.LoadAll([&](const std::string& id) {
-    if (access_.KnowsPrediction(id)) return true;
-    // Another server may have made it since; what is not known to be gone stays.
-    return cluster_ != nullptr && !absl::IsNotFound(stores_->predictions().Get(id).status());
+    return access_.KnowsPrediction(id) ||
+           !absl::IsNotFound(stores_->predictions().Get(id).status());
   }));
   TF_RETURN_IF_ERROR(registry_.LearnKnown());
   return absl::OkStatus();
@@ -144,11 +144,11 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       tokens_(std::move(parts.tokens)),
       quotas_(options.quotas),
       access_store_(std::move(parts.opened.access)),
-      access_([this] { return stores_->NowS(); }),
-      access_changes_(options.access, access_store_.get(), &access_),
       export_store_(std::move(parts.opened.exports)),
       exports_(options.exports, export_store_.get(), [this] { return stores_->NowS(); }),
       export_watches_(options.exports.max_watches),
+      access_([this] { return stores_->NowS(); }, &exports_),
+      access_changes_(options.access, access_store_.get(), &access_),
       authenticator_(parts.authenticator == nullptr
                          ? nullptr
                          : std::make_unique<LinkAuthenticator>(&access_, parts.authenticator)),
@@ -180,7 +180,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       session_service_(&gate_, options.limits, &access_, &catalog_, &registry_),
       deform_service_(&gate_, options.limits, &access_, &registry_, &streams_, &watches_, &timer_),
       prediction_service_(&gate_, options.limits, &access_, &catalog_, &registry_,
-                          &stores_->predictions(), &timer_),
+                          &stores_->predictions(), &exports_, &timer_),
       plan_service_(&gate_, &access_, &registry_),
       case_service_(&gate_, options.limits, &access_, &stores_->cases(), pool_.get(), &timer_),
       access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_,
@@ -196,24 +196,15 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   });
   catalog_.set_on_removed(
       [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
-  access_changes_.set_on_revoked([this] {
-    streams_.RecheckAccess();
-    watches_.RecheckAccess();
-  });
   exports_.set_on_changed(
       [this](const ExportRecord& record) { export_watches_.OnChanged(record); });
-  exports_.set_on_exported([this](const std::string& prediction, bool exported) {
-    access_changes_.SetExported(prediction, exported);
-  });
-  access_changes_.set_on_prediction_removed([this](const std::string& id) {
-    // In memory they are gone; a restart finds no prediction of those that the disk has.
-    if (!exports_.RemoveOf(id).ok()) spdlog::warn("exports of a removed prediction remain on disk");
-  });
   access_.set_most_bytes(options.quotas.disk_bytes);
   registry_.set_most_of_owner(options.quotas.sessions);
   budget_.set_account_limit(MemoryQuota(options), [this](const std::string& owner, int64_t bytes) {
     ReclaimOf(owner, bytes);
   });
+  // The one circle of callbacks: sessions and meshes that leave return their memory to the budget
+  // that asks for it. It asks without a lock held.
   budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
   if (cluster_ != nullptr) {
     cluster_->Join({.access = &access_changes_,

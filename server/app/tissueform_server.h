@@ -133,11 +133,11 @@ class TissueformServer {
   const std::unique_ptr<TokenAuthenticator> tokens_;
   CallQuotas quotas_;
   std::unique_ptr<AccessStore> access_store_;  // its rows are those of the stores
-  Access access_;
-  AccessChanges access_changes_;
   std::unique_ptr<ExportStore> export_store_;  // as access_store_
   ExportQueue exports_;
   ExportWatches export_watches_;
+  Access access_;
+  AccessChanges access_changes_;
   std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
   std::unique_ptr<Cluster> cluster_;                  // null without --store
   AdmissionControl gate_;

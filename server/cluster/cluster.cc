@@ -40,17 +40,20 @@ absl::StatusOr<std::unique_ptr<Cluster>> Cluster::Open(const ClusterOptions& opt
 
 Cluster::Cluster(const ClusterOptions& options, std::string name, PostgresStores* stores,
                  std::unique_ptr<PostgresPool> pool)
-    : pool_(std::move(pool)), stores_(stores), node_(pool_.get(), options, std::move(name)) {}
+    : pool_(std::move(pool)),
+      stores_(stores),
+      node_(pool_.get(), options, std::move(name)),
+      lookups_(pool_.get()) {}
 
 void Cluster::Join(ClusterListeners rooms, Access* access) {
   rooms.stores = stores_;
   rooms_ = rooms;
-  lookups_ = std::make_unique<ReadThroughLoader>(pool_.get(), rooms.access, rooms.exports);
   rooms.access->EnableClusterMode();
-  access->set_on_unknown(
-      [this](const Access::Unknown& what) { return lookups_->FetchIfMissing(what); });
-  rooms.exports->set_on_unknown(
-      [this](const std::string& id) { return lookups_->LookForExport(id); });
+  access->set_row_reader(&lookups_);
+  rooms.exports->set_read_gate(
+      [this](const std::string& id, const std::function<absl::Status()>& read) {
+        return lookups_.ReadForExport(id, read);
+      });
   rooms.sessions->set_naming_room(
       [this](const absl::Status& refusal) { return node_.NamingRoom(refusal); });
   node_.set_on_lost([sessions = rooms.sessions](const std::string& id) { sessions->Lost(id); });
@@ -96,7 +99,7 @@ void Cluster::AddTo(MetricsPage* page) {
                  [this] { return node_.nodes().IsNameTaken() ? 1.0 : 0.0; });
   page->AddCounter("tissueform_row_lookups_total",
                    "Database lookups of names that this node did not know.", {},
-                   [this] { return static_cast<double>(lookups_->lookups()); });
+                   [this] { return static_cast<double>(lookups_.lookups()); });
 }
 
 }  // namespace tissueform

@@ -38,8 +38,7 @@ class Cluster {
 
   ClusterNode& node() { return node_; }
   const std::string& name() const { return node_.name(); }
-  // Once joined.
-  const ReadThroughLoader& lookups() const { return *lookups_; }
+  const ReadThroughLoader& lookups() const { return lookups_; }
 
   // Whatever the rooms do not know they look for from now on. All must outlive Stop.
   void Join(ClusterListeners rooms, Access* access);
@@ -63,7 +62,7 @@ class Cluster {
   PostgresStores* const stores_;
   ClusterNode node_;
   ClusterListeners rooms_;
-  std::unique_ptr<ReadThroughLoader> lookups_;
+  ReadThroughLoader lookups_;
   std::unique_ptr<ChangeFollower> follower_;
 };
 

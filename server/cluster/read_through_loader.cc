@@ -16,23 +16,21 @@ constexpr size_t kMaxRemembered = 10'000;
 
 }  // namespace
 
-ReadThroughLoader::ReadThroughLoader(PostgresPool* pool, AccessChanges* access,
-                                     ExportQueue* exports)
-    : access_(*access),
-      exports_(*exports),
-      sessions_(pool, SystemUnixSeconds),
-      predictions_(pool),
-      cases_(pool),
-      rows_(pool) {}
+ReadThroughLoader::ReadThroughLoader(PostgresPool* pool)
+    : sessions_(pool, SystemUnixSeconds), predictions_(pool), cases_(pool), rows_(pool) {}
 
-absl::Status ReadThroughLoader::FetchIfMissing(const Access::Unknown& what) {
-  return Look({.kind = static_cast<int>(what.kind), .name = what.name, .owner = what.owner},
-              [&] { return Read(what); });
+absl::StatusOr<FoundRows> ReadThroughLoader::ReadRow(const RowName& row) {
+  FoundRows found;
+  TF_RETURN_IF_ERROR(
+      Look({.kind = static_cast<int>(row.kind), .name = row.name, .owner = row.owner},
+           [&] { return Read(row, &found); }));
+  return found;
 }
 
-absl::Status ReadThroughLoader::LookForExport(const std::string& id) {
+absl::Status ReadThroughLoader::ReadForExport(const std::string& id,
+                                              const std::function<absl::Status()>& read) {
   return Look({.kind = kExportKind, .name = id}, [&]() -> absl::Status {
-    TF_RETURN_IF_ERROR(exports_.ReloadRows());
+    TF_RETURN_IF_ERROR(read());
     return absl::NotFoundError("");  // not again at once, whatever it has found
   });
 }
@@ -80,39 +78,36 @@ absl::Status ReadThroughLoader::Look(const Key& key, const std::function<absl::S
   return absl::OkStatus();
 }
 
-absl::Status ReadThroughLoader::ReadSession(const std::string& id) {
+absl::Status ReadThroughLoader::ReadSession(const std::string& id, FoundRows* found) {
   std::promise<absl::StatusOr<SessionRecord>> answer;
   sessions_.Get(
       id, [&answer](absl::StatusOr<SessionRecord> record) { answer.set_value(std::move(record)); });
-  TF_ASSIGN_OR_RETURN(const SessionRecord record, answer.get_future().get());
-  access_.Added(record);
+  TF_ASSIGN_OR_RETURN(found->session, answer.get_future().get());
   return absl::OkStatus();
 }
 
-absl::Status ReadThroughLoader::Read(const Access::Unknown& what) {
-  switch (what.kind) {
-    case Access::Unknown::Kind::kSession:
-      return ReadSession(what.name);
-    case Access::Unknown::Kind::kPrediction: {
-      TF_ASSIGN_OR_RETURN(const PredictionRecord record, predictions_.Get(what.name));
-      access_.Added(record);
+absl::Status ReadThroughLoader::Read(const RowName& row, FoundRows* found) {
+  switch (row.kind) {
+    case RowName::Kind::kSession:
+      return ReadSession(row.name, found);
+    case RowName::Kind::kPrediction: {
+      TF_ASSIGN_OR_RETURN(found->prediction, predictions_.Get(row.name));
       return absl::OkStatus();
     }
-    case Access::Unknown::Kind::kCase: {
-      TF_ASSIGN_OR_RETURN(const CaseRecord record,
-                          cases_.Find({.sha256 = what.name, .owner = what.owner}));
-      access_.Added(record);
+    case RowName::Kind::kCase: {
+      TF_ASSIGN_OR_RETURN(found->of_case, cases_.Find({.sha256 = row.name, .owner = row.owner}));
       return absl::OkStatus();
     }
-    case Access::Unknown::Kind::kMesh: {
-      TF_ASSIGN_OR_RETURN(const MeshRight right, rows_.FindMeshRight(what.owner, what.name));
-      access_.OnRemoteChange({.mesh_rights = {right}});
+    case RowName::Kind::kMesh: {
+      TF_ASSIGN_OR_RETURN(MeshRight right, rows_.FindMeshRight(row.owner, row.name));
+      found->access.mesh_rights = {std::move(right)};
       return absl::OkStatus();
     }
-    case Access::Unknown::Kind::kLink: {
-      TF_ASSIGN_OR_RETURN(const FollowLinkRow link, rows_.FindLink(what.name));
-      access_.OnRemoteChange({.links = {link}});
-      return ReadSession(link.session);
+    case RowName::Kind::kLink: {
+      TF_ASSIGN_OR_RETURN(FollowLinkRow link, rows_.FindLink(row.name));
+      const std::string session = link.session;
+      found->access.links = {std::move(link)};
+      return ReadSession(session, found);
     }
   }
   return absl::NotFoundError("no such kind");

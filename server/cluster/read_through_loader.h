@@ -12,9 +12,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
-#include "server/access/access.h"
-#include "server/access/access_changes.h"
-#include "server/exports/export_queue.h"
+#include "server/access/row_reader.h"
 #include "server/store/postgres_store/postgres_access_store.h"
 #include "server/store/postgres_store/postgres_case_store.h"
 #include "server/store/postgres_store/postgres_pool.h"
@@ -30,26 +28,25 @@ namespace tissueform {
 //
 // Thread-safe. Calls block, for kPatience and as long as the pool is patient. Errors: Unavailable,
 // where nobody knows whether it is there.
-class ReadThroughLoader {
+class ReadThroughLoader final : public RowReader {
  public:
   static constexpr int kMaxAtOnce = 4;
   static constexpr std::chrono::seconds kRemembered{1};
   static constexpr std::chrono::seconds kPatience{1};  // for one of the places
 
-  // `pool` has connections for kMaxAtOnce of them; all must outlive it.
-  ReadThroughLoader(PostgresPool* pool, AccessChanges* access, ExportQueue* exports);
+  // `pool`, which must outlive it, has connections for kMaxAtOnce of them.
+  explicit ReadThroughLoader(PostgresPool* pool);
 
-  // Tells `access` of it where it is there.
-  absl::Status FetchIfMissing(const Access::Unknown& what);
-  // Tells `exports` to learn again where it is there.
-  absl::Status LookForExport(const std::string& id);
+  absl::StatusOr<FoundRows> ReadRow(const RowName& row) override;
+  // ExportQueue::ReadGate.
+  absl::Status ReadForExport(const std::string& id, const std::function<absl::Status()>& read);
 
   // Rows that were read, or were not there.
   int64_t lookups() const;
 
  private:
   struct Key {
-    int kind = 0;  // of Access::Unknown, or kExport
+    int kind = 0;  // of RowName, or kExportKind
     std::string name = {};
     std::string owner = {};
 
@@ -59,11 +56,9 @@ class ReadThroughLoader {
   absl::Status Look(const Key& key, const std::function<absl::Status()>& read);
   // A place; false where it is known not to be there. Errors: Unavailable.
   absl::StatusOr<bool> Begin(const Key& key);
-  absl::Status Read(const Access::Unknown& what);
-  absl::Status ReadSession(const std::string& id);
+  absl::Status Read(const RowName& row, FoundRows* found);
+  absl::Status ReadSession(const std::string& id, FoundRows* found);
 
-  AccessChanges& access_;
-  ExportQueue& exports_;
   PostgresSessionStore sessions_;
   PostgresPredictionStore predictions_;
   PostgresCaseStore cases_;

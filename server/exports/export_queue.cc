@@ -27,6 +27,14 @@ absl::Status TooManyExports(absl::string_view what, int limit, absl::string_view
       ErrorReason::kTooManyExports, {{"limit", absl::StrCat(limit)}});
 }
 
+// Takes the id out of the set of `key`, and that with its last one.
+void EraseFrom(std::map<std::string, std::set<std::string>>* ids, const std::string& key,
+               const std::string& id) {
+  const auto found = ids->find(key);
+  found->second.erase(id);
+  if (found->second.empty()) ids->erase(found);
+}
+
 }  // namespace
 
 std::string ExportQueue::EtagOf(const ExportRecord& record) { return absl::StrCat(record.version); }
@@ -40,13 +48,8 @@ absl::Status ExportQueue::LoadAll(const std::function<bool(const std::string&)>&
       orphans.push_back(record.id);
       continue;
     }
-    {
-      MutexLock lock(mutex_);
-      records_[record.id] = record;
-      of_prediction_[record.prediction].insert(record.id);
-      if (!record.request_key.empty()) of_request_[record.request_key] = record.id;
-    }
-    on_exported_(record.prediction, true);
+    MutexLock lock(mutex_);
+    Index(record);
   }
   return orphans.empty() ? absl::OkStatus() : store_.Erase(orphans);
 }
@@ -121,7 +124,7 @@ std::string ExportQueue::NewId() {
 absl::StatusOr<ExportRecord> ExportQueue::Create(ExportRecord wanted) {
   MutexLock writing(writing_);
   // Another server may have had the same request.
-  if (on_unknown_) TF_RETURN_IF_ERROR(Refresh());
+  if (read_gate_) TF_RETURN_IF_ERROR(Refresh());
   {
     MutexLock lock(mutex_);
     if (const ExportRecord* earlier = FindEarlier(wanted); earlier != nullptr) {
@@ -150,28 +153,29 @@ absl::Status ExportQueue::Keep(const ExportRecord& record) {
   return absl::OkStatus();
 }
 
+void ExportQueue::Index(const ExportRecord& record) {
+  records_[record.id] = record;
+  of_prediction_[record.prediction].insert(record.id);
+  of_case_[record.case_sha256].insert(record.id);
+  if (!record.request_key.empty()) of_request_[record.request_key] = record.id;
+}
+
 void ExportQueue::Take(const ExportRecord& record) {
-  bool is_first = false;
   {
     MutexLock lock(mutex_);
-    records_[record.id] = record;
-    std::set<std::string>& of_prediction = of_prediction_[record.prediction];
-    is_first = of_prediction.empty();
-    of_prediction.insert(record.id);
-    if (!record.request_key.empty()) of_request_[record.request_key] = record.id;
+    Index(record);
   }
-  if (is_first) on_exported_(record.prediction, true);
   on_changed_(record);
 }
 
-absl::StatusOr<ExportRecord> ExportQueue::Find(const std::string& id) const {
-  absl::StatusOr<ExportRecord> found = FindKnown(id);
-  if (found.ok() || !on_unknown_) return found;
-  TF_RETURN_IF_ERROR(on_unknown_(id));
-  return FindKnown(id);
+absl::StatusOr<ExportRecord> ExportQueue::FindOrRead(const std::string& id) {
+  absl::StatusOr<ExportRecord> found = Find(id);
+  if (found.ok() || !read_gate_) return found;
+  TF_RETURN_IF_ERROR(read_gate_(id, [this] { return ReloadRows(); }));
+  return Find(id);
 }
 
-absl::StatusOr<ExportRecord> ExportQueue::FindKnown(const std::string& id) const {
+absl::StatusOr<ExportRecord> ExportQueue::Find(const std::string& id) const {
   MutexLock lock(mutex_);
   const auto found = records_.find(id);
   if (found == records_.end()) return NoExport(id);
@@ -206,9 +210,23 @@ std::set<std::string> ExportQueue::Waiting(const std::optional<std::string>& own
 
 int ExportQueue::CountWaiting() const { return static_cast<int>(Waiting(std::nullopt).size()); }
 
+bool ExportQueue::IsExported(const std::string& prediction) const {
+  MutexLock lock(mutex_);
+  return of_prediction_.contains(prediction);
+}
+
+std::set<std::string> ExportQueue::ExportedOfCase(const std::string& case_sha256) const {
+  std::set<std::string> predictions;
+  MutexLock lock(mutex_);
+  const auto found = of_case_.find(case_sha256);
+  if (found == of_case_.end()) return predictions;
+  for (const std::string& id : found->second) predictions.insert(records_.at(id).prediction);
+  return predictions;
+}
+
 absl::StatusOr<ExportRecord> ExportQueue::Update(const std::string& id, const Change& change) {
   MutexLock writing(writing_);
-  TF_ASSIGN_OR_RETURN(ExportRecord record, FindKnown(id));
+  TF_ASSIGN_OR_RETURN(ExportRecord record, Find(id));
   if (!change.etag.empty() && change.etag != EtagOf(record)) return StaleExport(id);
   if (!MayFollow(record.state, change.state)) {
     return absl::InvalidArgumentError(
@@ -230,7 +248,7 @@ absl::StatusOr<ExportRecord> ExportQueue::Update(const std::string& id, const Ch
 
 absl::Status ExportQueue::Remove(const std::string& id) {
   MutexLock writing(writing_);
-  TF_RETURN_IF_ERROR(FindKnown(id).status());
+  TF_RETURN_IF_ERROR(Find(id).status());
   return Erase({id});
 }
 
@@ -266,23 +284,16 @@ absl::Status ExportQueue::Erase(const std::vector<std::string>& ids) {
 }
 
 void ExportQueue::Drop(const std::vector<std::string>& ids) {
-  std::vector<std::string> unclaimed;  // predictions
-  {
-    // From memory at once: what is taken back opens nothing any more, whatever the disk says.
-    MutexLock lock(mutex_);
-    for (const std::string& id : ids) {
-      const auto found = records_.find(id);
-      const ExportRecord record = std::move(found->second);
-      records_.erase(found);
-      of_request_.erase(record.request_key);
-      const auto others = of_prediction_.find(record.prediction);
-      others->second.erase(id);
-      if (!others->second.empty()) continue;
-      of_prediction_.erase(others);
-      unclaimed.push_back(record.prediction);
-    }
+  // From memory at once: what is taken back opens nothing any more, whatever the disk says.
+  MutexLock lock(mutex_);
+  for (const std::string& id : ids) {
+    const auto found = records_.find(id);
+    const ExportRecord record = std::move(found->second);
+    records_.erase(found);
+    of_request_.erase(record.request_key);
+    EraseFrom(&of_prediction_, record.prediction, id);
+    EraseFrom(&of_case_, record.case_sha256, id);
   }
-  for (const std::string& prediction : unclaimed) on_exported_(prediction, false);
 }
 
 }  // namespace tissueform

@@ -39,20 +39,17 @@ class ExportQueue {
   ExportQueue(const ExportLimits& limits, ExportStore* store, UnixClock clock = SystemUnixSeconds)
       : limits_(limits), store_(*store), clock_(std::move(clock)) {}
 
-  // Before anything else. The first is told of every export that is new or changed, the second of a
-  // prediction that has an export now, or none any more.
+  // Before anything else. It is told of every export that is new or changed.
   void set_on_changed(std::function<void(const ExportRecord&)> on_changed) {
     on_changed_ = std::move(on_changed);
   }
-  void set_on_exported(std::function<void(const std::string& prediction, bool exported)> told) {
-    on_exported_ = std::move(told);
-  }
 
-  // Where others write to the store as well: asked once for an id that is not known, without a lock
-  // held; calls ReloadRows. Errors: what Find answers where that is not possible.
-  void set_on_unknown(std::function<absl::Status(const std::string& id)> on_unknown) {
-    on_unknown_ = std::move(on_unknown);
-  }
+  // Where others write to the store as well: decides whether the store is asked for an id that is
+  // not known, and calls `read` then, at most once; without a lock held. Errors: what FindOrRead
+  // answers where it cannot be found out. Before anything else.
+  using ReadGate =
+      std::function<absl::Status(const std::string& id, const std::function<absl::Status()>& read)>;
+  void set_read_gate(ReadGate gate) { read_gate_ = std::move(gate); }
 
   const ExportLimits& limits() const { return limits_; }
 
@@ -71,8 +68,11 @@ class ExportQueue {
   // ExportStore.
   absl::StatusOr<ExportRecord> Create(ExportRecord wanted);
 
-  // Errors: NotFound, those of set_on_unknown.
+  // By what is known here. Never blocks. Errors: NotFound.
   absl::StatusOr<ExportRecord> Find(const std::string& id) const;
+  // The same, but asks the store where it is not known and others write to it. Not from
+  // set_on_changed. Errors: NotFound, those of set_read_gate.
+  absl::StatusOr<ExportRecord> FindOrRead(const std::string& id);
 
   struct ListRequest {
     std::optional<std::string> owner = {};        // of this one only; unset: of all
@@ -89,6 +89,11 @@ class ExportQueue {
   // Ids of those that are not done, of this owner only where one is given.
   std::set<std::string> Waiting(const std::optional<std::string>& owner) const;
   int CountWaiting() const;
+
+  // Whether there is an export of the prediction, done or not.
+  bool IsExported(const std::string& prediction) const;
+  // Predictions with an export that were planned in the case.
+  std::set<std::string> ExportedOfCase(const std::string& case_sha256) const;
 
   struct Change {
     std::string etag = {};  // of the one that was seen; empty: any
@@ -110,16 +115,18 @@ class ExportQueue {
   static std::string EtagOf(const ExportRecord& record);
 
  private:
+  using IdsOf = std::map<std::string, std::set<std::string>>;
+
   const ExportRecord* FindEarlier(const ExportRecord& wanted) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status CheckRoom(const std::string& owner) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::string NewId() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  absl::StatusOr<ExportRecord> FindKnown(const std::string& id) const;
   absl::Status Refresh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
+  void Index(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Into memory, and told.
   void Take(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
-  // Out of memory, and told.
+  // Out of memory.
   void Drop(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   absl::Status Keep(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   absl::Status Erase(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
@@ -129,9 +136,7 @@ class ExportQueue {
   ExportStore& store_;
   const UnixClock clock_;
   std::function<void(const ExportRecord&)> on_changed_ = [](const ExportRecord&) {};
-  std::function<void(const std::string&, bool)> on_exported_ = [](const std::string&, bool) {};
-
-  std::function<absl::Status(const std::string&)> on_unknown_;  // empty: nobody else writes
+  ReadGate read_gate_;  // empty: nobody else writes
 
   // Held over the store and over those who are told: changes come one after the other.
   Mutex writing_;
@@ -139,7 +144,8 @@ class ExportQueue {
   // After writing_, and over nothing else.
   mutable Mutex mutex_;
   std::map<std::string, ExportRecord> records_ ABSL_GUARDED_BY(mutex_);
-  std::map<std::string, std::set<std::string>> of_prediction_ ABSL_GUARDED_BY(mutex_);
+  IdsOf of_prediction_ ABSL_GUARDED_BY(mutex_);
+  IdsOf of_case_ ABSL_GUARDED_BY(mutex_);
   std::map<std::string, std::string> of_request_ ABSL_GUARDED_BY(mutex_);
 };
 

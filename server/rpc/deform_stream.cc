@@ -98,11 +98,18 @@ void DeformStreamReactor::WaitToReauthorize() {
                             [this] { RecheckAuthorization(); });
 }
 
+absl::Status DeformStreamReactor::IsStillAllowed() const {
+  TF_RETURN_IF_ERROR(scope_.IsStillAuthorized());
+  if (!flow_.has_value()) return absl::OkStatus();  // checked when it names its session
+  return access_.RecheckSessionAccess(scope_.principal(), stream_request_.session_id,
+                                      Permission::kWrite);
+}
+
 void DeformStreamReactor::RecheckAuthorization() {
   {
     MutexLock lock(mutex_);
     if (finished_) return;
-    const absl::Status good = scope_.IsStillAuthorized();
+    const absl::Status good = IsStillAllowed();
     if (good.ok()) {
       WaitToReauthorize();
       return;
@@ -188,15 +195,6 @@ void DeformStreamReactor::Tell(int followers) {
 void DeformStreamReactor::NotifyDraining(std::chrono::system_clock::time_point end) {
   MutexLock lock(mutex_);
   notices_.push_back(DrainingAt(end));
-  Advance();
-}
-
-void DeformStreamReactor::RecheckAccess() {
-  MutexLock lock(mutex_);
-  if (!flow_.has_value()) return;  // is asked when it names its session
-  const absl::Status allowed = access_.CheckSessionAccess(
-      scope_.principal(), stream_request_.session_id, Permission::kWrite);
-  if (!allowed.ok()) End(allowed);
   Advance();
 }
 

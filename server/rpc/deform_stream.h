@@ -56,8 +56,6 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
 
   // Tells the client that the server drains, and when it ends. Any thread.
   void NotifyDraining(std::chrono::system_clock::time_point end);
-  // Ends the stream where its caller may not drag the session any more. Any thread.
-  void RecheckAccess();
   // Ends the stream where it is of this session, and that is not held any more. Any thread.
   void EndIfMoved(const std::string& session_id);
   // The name of who drags, however the token is renewed.
@@ -71,8 +69,9 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void TellFollowers() ABSL_LOCKS_EXCLUDED(mutex_, followers_mutex_);
   void Tell(int followers) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // Its caller's token may have ended.
+  // The caller's token may have ended, or the caller may have lost the right to drag the session.
   void WaitToReauthorize() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status IsStillAllowed() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void RecheckAuthorization() ABSL_LOCKS_EXCLUDED(mutex_);
 
   // The client has had its time for the configuration.

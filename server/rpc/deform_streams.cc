@@ -34,11 +34,6 @@ void DeformStreams::NotifyDraining(std::chrono::system_clock::time_point end) {
   }
 }
 
-void DeformStreams::RecheckAccess() {
-  MutexLock lock(mutex_);
-  for (DeformStreamReactor* stream : streams_) stream->RecheckAccess();
-}
-
 void DeformStreams::OnSessionEvent(const std::string& session_id, SessionEvent event) {
   if (event != SessionEvent::kMoved) return;
   MutexLock lock(mutex_);

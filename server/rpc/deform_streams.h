@@ -32,8 +32,6 @@ class DeformStreams {
   void Remove(DeformStreamReactor* stream);
 
   void NotifyDraining(std::chrono::system_clock::time_point end);
-  // Each whether it may still drag.
-  void RecheckAccess();
   // As the registry's observer.
   void OnSessionEvent(const std::string& session_id, SessionEvent event);
   std::map<std::string, int64_t> CountByPrincipal() const;

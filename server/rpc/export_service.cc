@@ -108,7 +108,7 @@ grpc::ServerUnaryReactor* ExportService::DeleteExport(grpc::CallbackServerContex
 absl::StatusOr<ExportRecord> ExportService::Allowed(CallScope* scope, const std::string& name,
                                                     Permission need) const {
   TF_ASSIGN_OR_RETURN(const std::string id, ParseExportName(name));
-  TF_ASSIGN_OR_RETURN(ExportRecord record, book_->Find(id));
+  TF_ASSIGN_OR_RETURN(ExportRecord record, book_->FindOrRead(id));
   TF_RETURN_IF_ERROR(
       Access::CheckExportAccess(scope->principal(), record.owner, NoExport(id), need));
   scope->SetResource(name);

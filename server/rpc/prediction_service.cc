@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "spdlog/spdlog.h"
 
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
@@ -282,7 +283,10 @@ absl::Status PredictionService::Remove(CallScope* scope,
                                        const v1::DeletePredictionRequest& request) {
   TF_ASSIGN_OR_RETURN(const std::string id,
                       AllowedPrediction(*access_, scope, request.name(), Permission::kOwner));
-  return store_->Delete(id);
+  TF_RETURN_IF_ERROR(store_->Delete(id));
+  // In memory its exports are gone; after a restart there is no prediction of those on the disk.
+  if (!exports_->RemoveOf(id).ok()) spdlog::warn("exports of a removed prediction remain on disk");
+  return absl::OkStatus();
 }
 
 }  // namespace tissueform

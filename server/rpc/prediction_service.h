@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 
 #include "server/access/access.h"
+#include "server/exports/export_queue.h"
 #include "server/rpc/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
@@ -24,13 +25,14 @@ class PredictionService final : public v1::PredictionService::CallbackService {
  public:
   PredictionService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
                     MeshCatalog* catalog, SessionRegistry* registry, PredictionStore* store,
-                    DeadlineTimer* timer)
+                    ExportQueue* exports, DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
         access_(access),
         catalog_(catalog),
         registry_(registry),
         store_(store),
+        exports_(exports),
         timer_(timer) {}
 
   grpc::ServerUnaryReactor* CreatePrediction(grpc::CallbackServerContext* context,
@@ -67,6 +69,7 @@ class PredictionService final : public v1::PredictionService::CallbackService {
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;
+  ExportQueue* const exports_;
   DeadlineTimer* const timer_;
 };
 

@@ -117,14 +117,8 @@ void WatchStreamReactor::Join(const std::shared_ptr<Session>& session) {
     MutexLock lock(mutex_);
     hold_ = session->hold();
   }
-  // Once more: who was told between the two that less may be watched did not find this watch.
-  absl::Status allowed = joined.status();
-  if (allowed.ok()) {
-    MutexLock lock(mutex_);
-    allowed = access_.CheckSessionAccess(scope_.principal(), session_id_, Permission::kRead);
-  }
-  if (!allowed.ok() || joined->has_frame) {
-    FinishOpening(allowed);
+  if (!joined.ok() || joined->has_frame) {
+    FinishOpening(joined.status());
     return;
   }
   channel_ = std::move(joined->channel);
@@ -197,11 +191,16 @@ void WatchStreamReactor::WaitToReauthorize() {
                             [this] { RecheckAuthorization(); });
 }
 
+absl::Status WatchStreamReactor::IsStillAllowed() const {
+  TF_RETURN_IF_ERROR(scope_.IsStillAuthorized());
+  return access_.RecheckSessionAccess(scope_.principal(), session_id_, Permission::kRead);
+}
+
 void WatchStreamReactor::RecheckAuthorization() {
   {
     MutexLock lock(mutex_);
     if (finished_) return;
-    const absl::Status good = scope_.IsStillAuthorized();
+    const absl::Status good = IsStillAllowed();
     if (good.ok()) {
       WaitToReauthorize();
       return;
@@ -244,14 +243,6 @@ absl::Status WatchStreamReactor::Acknowledge(uint64_t number, const Authenticate
   while (!unacked_.empty() && unacked_.front() <= number) unacked_.pop_front();
   Advance();
   return absl::OkStatus();
-}
-
-void WatchStreamReactor::RecheckAccess() {
-  MutexLock lock(mutex_);
-  const absl::Status allowed =
-      access_.CheckSessionAccess(scope_.principal(), session_id_, Permission::kRead);
-  if (!allowed.ok()) End(allowed);
-  Advance();
 }
 
 void WatchStreamReactor::End(const absl::Status& outcome) {

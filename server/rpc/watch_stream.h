@@ -51,11 +51,11 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void Tell(const v1::DeformNotice& notice) override;
   void EndWatch(const absl::Status& outcome) override;
   absl::Status Acknowledge(uint64_t number, const Authenticated& by) override;
-  void RecheckAccess() override;
 
  private:
-  // Its caller's token may have ended.
+  // The caller's token may have ended, or the caller may have lost the right to watch the session.
   void WaitToReauthorize() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status IsStillAllowed() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void RecheckAuthorization() ABSL_LOCKS_EXCLUDED(mutex_);
 
   absl::Status ReadRequest(const grpc::ByteBuffer& bytes);

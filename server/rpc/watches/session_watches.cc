@@ -134,11 +134,6 @@ void SessionWatches::NotifyDraining(std::chrono::system_clock::time_point end) {
   }
 }
 
-void SessionWatches::RecheckAccess() {
-  MutexLock lock(mutex_);
-  for (const auto& [name, watch] : watches_) watch.watcher->RecheckAccess();
-}
-
 std::map<std::string, int64_t> SessionWatches::CountByPrincipal() const {
   std::map<std::string, int64_t> counts;
   MutexLock lock(mutex_);

@@ -30,8 +30,6 @@ class CreditedWatcher : public Watcher {
   // `by` whom it is acknowledged: its token may be newer than the watch's. Errors: InvalidArgument
   // (a frame that was not sent).
   virtual absl::Status Acknowledge(uint64_t number, const Authenticated& by) = 0;
-  // Ends where it may not watch any more.
-  virtual void RecheckAccess() = 0;
 
  protected:
   ~CreditedWatcher() = default;
@@ -67,9 +65,6 @@ class SessionWatches {
   void OnSessionEvent(const std::string& session_id, SessionRegistry::Event event);
   // From now on watches end with the drags.
   void NotifyDraining(std::chrono::system_clock::time_point end);
-
-  // Each whether it may still watch.
-  void RecheckAccess();
 
   std::map<std::string, int64_t> CountByPrincipal() const;
   int size() const;

@@ -27,10 +27,7 @@ const std::string kMesh(64, 'e');
 
 class AccessChangesTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    changes_.set_on_revoked([this] { ++revoked_; });
-    AddSession("s", "ann");
-  }
+  void SetUp() override { AddSession("s", "ann"); }
 
   void AddSession(const std::string& id, const std::string& owner) {
     SessionRecord session;
@@ -65,7 +62,6 @@ class AccessChangesTest : public ::testing::Test {
   const Principal ann_{.name = "ann"};
   const Principal bob_{.name = "bob"};
   int64_t now_s_ = 1000;
-  int revoked_ = 0;
   InMemoryAccessStore store_;
   Access access_{[this] { return now_s_; }};
   AccessChanges changes_{
@@ -92,12 +88,13 @@ TEST_F(AccessChangesTest, WhatIsNoNameIsRefused) {
   EXPECT_THAT(Share(ann_, "sessions/none", "bob"), StatusIs(Code::kNotFound));
 }
 
-TEST_F(AccessChangesTest, AShareThatIsTakenBackIsAwayAtOnceAndStreamsAreAsked) {
+TEST_F(AccessChangesTest, AShareThatIsTakenBackIsAwayAtOnce) {
   ASSERT_THAT(Share(ann_, "sessions/s", "bob", ShareRole::kPlanner), IsOk());
-  EXPECT_EQ(revoked_, 0);
+  EXPECT_THAT(access_.RecheckSessionAccess(bob_, "s", Permission::kWrite), IsOk());
   ASSERT_THAT(Unshare(ann_, "sessions/s", "bob"), IsOk());
-  EXPECT_EQ(revoked_, 1);
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kRead), StatusIs(Code::kNotFound));
+  EXPECT_THAT(access_.RecheckSessionAccess(bob_, "s", Permission::kRead),
+              StatusIs(Code::kNotFound));
   EXPECT_THAT(store_.Load()->shares, IsEmpty());
   EXPECT_THAT(Unshare(ann_, "sessions/s", "bob"), StatusIs(Code::kNotFound));
 }
@@ -204,7 +201,6 @@ class FollowingAccessChangesTest : public ::testing::Test {
  protected:
   void SetUp() override {
     changes_.EnableClusterMode();
-    changes_.set_on_revoked([this] { ++revoked_; });
     SessionRecord session;
     session.id = "s";
     session.owner = "ann";
@@ -224,7 +220,6 @@ class FollowingAccessChangesTest : public ::testing::Test {
   const Principal ann_{.name = "ann"};
   const Principal bob_{.name = "bob"};
   const ShareRow share_{.resource = "sessions/s", .owner = "ann", .principal = "bob"};
-  int revoked_ = 0;
   HeldAccessStore store_;
   Access access_;
   AccessChanges changes_{{}, &store_, &access_};
@@ -236,10 +231,8 @@ TEST_F(FollowingAccessChangesTest, WhatOthersGiveAndTakeIsLearnt) {
   ASSERT_THAT(changes_.ReloadRows(), IsOk());
   EXPECT_TRUE(BobMayLook());
   store_.rows().Change({.shares = {share_}}, {}, [](const absl::Status&) {});
-  revoked_ = 0;
   ASSERT_THAT(changes_.ReloadRows(), IsOk());
   EXPECT_FALSE(BobMayLook());
-  EXPECT_EQ(revoked_, 1) << "streams ask again";
   changes_.SessionGone("s");
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "s", Permission::kRead), StatusIs(Code::kNotFound));
 }
@@ -296,18 +289,34 @@ TEST_F(FollowingAccessChangesTest, WhatOneServerGivesWhileAnotherDeletesTheSessi
   EXPECT_FALSE(BobMayLook());
 }
 
+// Has the session "t" of ann's and a link to it, "l"; does not answer for "away".
+class ShownRows final : public RowReader {
+ public:
+  absl::StatusOr<FoundRows> ReadRow(const RowName& row) override {
+    asked.push_back(row);
+    if (row.name == "away") return absl::UnavailableError("the store is away");
+    FoundRows found;
+    if (row.name == "l") {
+      found.access.links = {{.digest = "l",
+                             .session = "t",
+                             .maker = "ann",
+                             .expires_s = std::numeric_limits<int64_t>::max()}};
+    } else if (row.name != "t") {
+      return found;
+    }
+    found.session.emplace();
+    found.session->id = "t";
+    found.session->owner = "ann";
+    return found;
+  }
+
+  std::vector<RowName> asked;
+};
+
 TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBeforeItIsRefused) {
-  std::vector<Access::Unknown> asked;
-  access_.set_on_unknown([&](const Access::Unknown& what) {
-    asked.push_back(what);
-    if (what.name == "away") return absl::UnavailableError("the store is away");
-    if (what.name != "t") return absl::OkStatus();
-    SessionRecord session;
-    session.id = "t";
-    session.owner = "ann";
-    changes_.Added(session);
-    return absl::OkStatus();
-  });
+  ShownRows rows;
+  access_.set_row_reader(&rows);
+  const std::vector<RowName>& asked = rows.asked;
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "t", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "t", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kRead), StatusIs(Code::kNotFound));
@@ -323,6 +332,19 @@ TEST_F(FollowingAccessChangesTest, WhatACallNamesAndNobodyKnowsIsLookedForBefore
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "away", Permission::kRead),
               StatusIs(Code::kUnavailable))
       << "nobody knows that it is not there";
+}
+
+TEST_F(FollowingAccessChangesTest, ALinkThatIsFoundWhileAllIsReadStaysAndIsNotLookedForAgain) {
+  ShownRows rows;
+  access_.set_row_reader(&rows);
+  EXPECT_THAT(access_.RecheckLink("l"), StatusIs(Code::kUnauthenticated));
+  EXPECT_THAT(rows.asked, IsEmpty()) << "a call that lasts does not wait for the store";
+  store_.AfterReading([this] { EXPECT_THAT(access_.FindLink("l"), IsOk()); });
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
+  EXPECT_THAT(access_.RecheckLink("l"), IsOk());
+  EXPECT_THAT(rows.asked, SizeIs(1));
+  ASSERT_THAT(changes_.ReloadRows(), IsOk());
+  EXPECT_THAT(access_.RecheckLink("l"), StatusIs(Code::kUnauthenticated)) << "it was taken back";
 }
 
 }  // namespace

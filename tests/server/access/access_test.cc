@@ -3,13 +3,17 @@
 
 #include "server/access/access.h"
 
+#include <memory>
 #include <string>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
 #include "server/access/access_changes.h"
+#include "server/exports/export_queue.h"
+#include "server/exports/export_store.h"
 #include "server/store/access_store/in_memory_access_store.h"
+#include "server/store/in_memory_stores.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {
@@ -43,6 +47,9 @@ class AccessTest : public ::testing::Test {
     changes_.Added(CaseRecord{.sha256 = kCase, .owner = ann_.name, .project = "p"});
   }
 
+  void Export(const std::string& prediction) {
+    ASSERT_THAT(exports_.Create({.prediction = prediction, .case_sha256 = kCase}), IsOk());
+  }
   absl::Status Share(const std::string& resource, const std::string& with,
                      ShareRole role = ShareRole::kViewer) {
     absl::Status outcome;
@@ -56,7 +63,10 @@ class AccessTest : public ::testing::Test {
   const Principal nobody_ = {};
   int64_t now_s_ = 1000;
   InMemoryAccessStore store_;
-  Access access_{[this] { return now_s_; }};
+  std::unique_ptr<Stores> stores_ = *OpenInMemoryStores();
+  std::unique_ptr<ExportStore> export_store_ = OpenExportStore(stores_.get());
+  ExportQueue exports_{{}, export_store_.get()};
+  Access access_{[this] { return now_s_; }, &exports_};
   AccessChanges changes_{{}, &store_, &access_};
 };
 
@@ -71,7 +81,7 @@ TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
               StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.CheckMeshAccess(bridge, kMesh, Permission::kRead), StatusIs(Code::kNotFound));
-  changes_.SetExported("q", true);
+  Export("q");
   EXPECT_TRUE(looks(bridge));
   EXPECT_FALSE(looks(bob_));
   EXPECT_THAT(access_.CheckPredictionAccess(bridge, "q", Permission::kOwner),
@@ -80,10 +90,10 @@ TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
               StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.SharedPredictions(bridge), ElementsAre("q"));
   ASSERT_EQ(access_.SharedCases(bridge).size(), 1U);
-  changes_.SetExported("q", false);
+  ASSERT_THAT(exports_.RemoveOf("q"), IsOk());
   EXPECT_FALSE(looks(bridge));
   EXPECT_THAT(access_.SharedPredictions(bridge), IsEmpty());
-  changes_.SetExported("q", true);
+  Export("q");
   changes_.PredictionRemoved("q");
   EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
 }
@@ -96,7 +106,7 @@ TEST_F(AccessTest, WhoNamesAnothersCaseDoesNotOpenItToABridge) {
   foreign.owner = bob_.name;
   foreign.case_sha256 = kCase;
   changes_.Added(foreign);
-  changes_.SetExported("b", true);
+  Export("b");
   EXPECT_THAT(access_.CheckPredictionAccess(bridge, "b", Permission::kRead), IsOk());
   EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
   ASSERT_THAT(Share("cases/" + kCase, "bob"), IsOk());
