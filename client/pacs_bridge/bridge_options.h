@@ -16,9 +16,9 @@
 #include "client/pacs_bridge/network/pacs_client.h"
 #include "client/pacs_bridge/network/storage_receiver.h"
 #include "client/pacs_bridge/review/review_server.h"
-#include "client/pacs_bridge/series/series_rules.h"
 #include "client/pacs_bridge/work/plan_work.h"
 #include "client/pacs_bridge/work/retention.h"
+#include "core/imaging/series/series_rules.h"
 
 namespace tissueform {
 

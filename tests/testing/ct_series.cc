@@ -15,6 +15,7 @@
 
 #include "client/pacs_bridge/dicom/dicom_file.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "core/imaging/series/image_header.h"
 
 namespace tissueform::testing {
 namespace {

@@ -34,6 +34,7 @@
 #include "core/base/atomic_file.h"
 #include "core/base/process/guarded_program.h"
 #include "core/base/status_macros.h"
+#include "core/imaging/series/image_header.h"
 
 namespace tissueform::benchmarks {
 namespace {

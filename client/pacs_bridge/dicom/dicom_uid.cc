@@ -44,9 +44,4 @@ bool IsDicomUid(absl::string_view text) {
   return std::all_of(components.begin(), components.end(), IsComponent);
 }
 
-bool IsCtClass(absl::string_view class_uid) {
-  return class_uid == kCtImageClass || class_uid == kEnhancedCtImageClass ||
-         class_uid == kLegacyEnhancedCtImageClass;
-}
-
 }  // namespace tissueform

@@ -17,18 +17,11 @@ std::string NewDicomUid();
 // leading zero. What does not pass is never part of a file name or a query.
 bool IsDicomUid(absl::string_view text);
 
-// SOP classes that the bridge names.
+// SOP classes that the bridge names; those of CT images are in core/imaging/series.
 inline constexpr absl::string_view kVerificationClass = "1.2.840.10008.1.1";
-inline constexpr absl::string_view kCtImageClass = "1.2.840.10008.5.1.4.1.1.2";
-inline constexpr absl::string_view kEnhancedCtImageClass = "1.2.840.10008.5.1.4.1.1.2.1";
-inline constexpr absl::string_view kLegacyEnhancedCtImageClass = "1.2.840.10008.5.1.4.1.1.2.2";
 inline constexpr absl::string_view kColourCaptureClass = "1.2.840.10008.5.1.4.1.1.7.4";
 inline constexpr absl::string_view kComprehensiveSrClass = "1.2.840.10008.5.1.4.1.1.88.33";
 inline constexpr absl::string_view kEncapsulatedStlClass = "1.2.840.10008.5.1.4.1.1.104.3";
-
-// Whether objects of this SOP class are images of a CT, of one frame or of several: the only ones
-// of a series that a plan is built of.
-bool IsCtClass(absl::string_view class_uid);
 
 // Transfer syntaxes that the bridge names.
 inline constexpr absl::string_view kImplicitLittleEndian = "1.2.840.10008.1.2";

@@ -22,6 +22,7 @@
 #include "client/pacs_bridge/network/one_header.h"
 #include "core/base/certificates.h"
 #include "core/base/status_macros.h"
+#include "core/imaging/series/image_header.h"
 
 namespace tissueform {
 namespace {

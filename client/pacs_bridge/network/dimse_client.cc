@@ -20,6 +20,7 @@
 #include "client/pacs_bridge/network/dimse_queries.h"
 #include "client/pacs_bridge/network/one_header.h"
 #include "core/base/status_macros.h"
+#include "core/imaging/series/image_header.h"
 
 namespace tissueform {
 namespace {

@@ -7,9 +7,9 @@
 #include <array>
 #include <iterator>
 
-#include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/queue/bridge_queue.h"
 #include "core/base/status_macros.h"
+#include "core/imaging/series/image_header.h"
 
 namespace tissueform {
 namespace {

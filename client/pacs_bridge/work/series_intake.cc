@@ -275,7 +275,7 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
 
 absl::StatusOr<SeriesFacts> SeriesIntake::FactsOf(const QueuedSeries& series) {
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedImage> images, rows_.ListImages(series.key));
-  std::vector<InstanceHeader> headers;
+  std::vector<ImageHeader> headers;
   for (const QueuedImage& image : images) {
     if (image.file.empty()) continue;
     TF_ASSIGN_OR_RETURN(headers.emplace_back(), ReadInstanceHeader(image.file));

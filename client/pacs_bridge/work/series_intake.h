@@ -17,8 +17,8 @@
 #include "client/pacs_bridge/dicom/instance_header.h"
 #include "client/pacs_bridge/network/pacs_client.h"
 #include "client/pacs_bridge/queue/received_rows.h"
-#include "client/pacs_bridge/series/series_pick.h"
 #include "core/base/mutex.h"
+#include "core/imaging/series/series_pick.h"
 
 namespace tissueform {
 

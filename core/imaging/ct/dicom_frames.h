@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_header.h"
 
 namespace gdcm {
 class DataSet;

@@ -9,7 +9,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/imaging/ct/ct_volume_reader.h"
-#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_header.h"
 #include "core/imaging/ct/dicom_stack.h"
 
 namespace tissueform {

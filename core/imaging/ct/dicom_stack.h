@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include <Eigen/Core>
 
-#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_header.h"
 
 namespace tissueform {
 

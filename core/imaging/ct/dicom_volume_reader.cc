@@ -13,7 +13,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_header.h"
 #include "core/imaging/ct/dicom_series.h"
 #include "core/imaging/ct/file_bytes.h"
 #include "core/imaging/ct/hu_check.h"

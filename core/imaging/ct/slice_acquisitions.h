@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_header.h"
 
 namespace tissueform {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/imaging/ct/ct_volume_reader.h"
-#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_header.h"
 
 namespace tissueform {
 

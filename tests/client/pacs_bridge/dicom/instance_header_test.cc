@@ -11,6 +11,7 @@
 
 #include "client/pacs_bridge/dicom/dicom_text.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "core/imaging/series/image_header.h"
 #include "tests/testing/ct_series.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"

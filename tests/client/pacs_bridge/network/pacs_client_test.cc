@@ -20,6 +20,7 @@
 #include "client/pacs_bridge/dicom/dicom_file.h"
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/network/storage_receiver.h"
+#include "core/imaging/series/image_header.h"
 #include "tests/client/pacs_bridge/network/dicom_peers.h"
 #include "tests/testing/ct_series.h"
 #include "tests/testing/status_matchers.h"

@@ -9,6 +9,7 @@
 #include "gmock/gmock.h"
 
 #include "core/base/stopwatch.h"
+#include "core/imaging/series/image_header.h"
 #include "core/planning/case_file/case_reader.h"
 #include "core/planning/rendering/virtual_display.h"
 #include "tests/client/pacs_bridge/objects/objects_fixture.h"

@@ -21,6 +21,7 @@
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/objects/prediction_objects.h"
+#include "core/imaging/series/image_header.h"
 #include "core/planning/case_file/predicted_case.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "tests/core/planning/case_file/sample_case.h"

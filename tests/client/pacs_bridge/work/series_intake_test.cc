@@ -12,6 +12,7 @@
 #include "gtest/gtest.h"
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "core/imaging/series/image_header.h"
 #include "tests/client/pacs_bridge/work/bridge_work.h"
 
 namespace tissueform {

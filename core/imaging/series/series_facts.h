@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "client/pacs_bridge/dicom/instance_header.h"
-#include "client/pacs_bridge/series/kernel_kind.h"
+#include "core/imaging/series/image_header.h"
+#include "core/imaging/series/kernel_kind.h"
 
 namespace tissueform {
 
@@ -19,7 +19,7 @@ enum class SliceOrientation { kAxial, kCoronal, kSagittal, kOblique, kNone };
 // of a screen, a report, a scout) says nothing of the scan. Numbers are of the slices that lie at
 // different places.
 struct SeriesFacts {
-  std::string key = {};  // of the queue
+  std::string key = {};  // the caller's name for it
   std::string study_uid = {};
   std::string modality = {};
   std::string description = {};  // for rules only, never in a text: it may hold anything
@@ -44,7 +44,7 @@ struct SeriesFacts {
 };
 
 // REQUIRES: headers of one series, at least one.
-SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& objects);
+SeriesFacts FactsOfSeries(const std::string& key, const std::vector<ImageHeader>& objects);
 
 // "231 axial slices, 0.60 mm apart, over 138 mm, soft kernel", for people; nothing of a patient.
 std::string DescribeFacts(const SeriesFacts& facts);

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/pacs_bridge/series/series_facts.h"
+#include "core/imaging/series/series_facts.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@
 #include "absl/strings/str_format.h"
 #include <Eigen/Geometry>
 
-#include "client/pacs_bridge/dicom/dicom_uid.h"
+#include "core/imaging/series/image_header.h"
 
 namespace tissueform {
 namespace {
@@ -30,7 +30,7 @@ constexpr double kSameDirection = 1e-4;
 const double kAxialCosine = std::cos(31.0 * M_PI / 180.0);
 // A place is missing where the next image is farther than so many spacings.
 constexpr double kGapSpacings = 1.5;
-Vector3d NormalOf(const InstanceHeader& image) {
+Vector3d NormalOf(const ImageHeader& image) {
   const Vector3d row = image.axes->col(0);
   const Vector3d column = image.axes->col(1);
   const Vector3d normal = row.cross(column);
@@ -46,10 +46,10 @@ SliceOrientation PlaneOf(const Vector3d& normal) {
 }
 
 // Sorted, of those that have a place; all along the first one's normal.
-std::vector<double> PlacesOf(const std::vector<InstanceHeader>& images, SeriesFacts* facts) {
+std::vector<double> PlacesOf(const std::vector<ImageHeader>& images, SeriesFacts* facts) {
   std::vector<Vector3d> normals;
   std::vector<double> places;
-  for (const InstanceHeader& image : images) {
+  for (const ImageHeader& image : images) {
     if (!image.position.has_value() || !image.axes.has_value()) continue;
     const Vector3d normal = NormalOf(image);
     const auto same = [&normal](const Vector3d& known) {
@@ -90,7 +90,7 @@ void MeasurePlaces(const std::vector<double>& places, SeriesFacts* facts) {
   }
 }
 
-bool IsLocaliser(const InstanceHeader& image) {
+bool IsLocaliser(const ImageHeader& image) {
   return absl::StrContains(image.image_type, "LOCALIZER") ||
          absl::StrContains(image.image_type, "SCOUT");
 }
@@ -98,19 +98,19 @@ bool IsLocaliser(const InstanceHeader& image) {
 // SOP class, and whether it is a scout.
 using ObjectKind = std::pair<std::string, bool>;
 
-ObjectKind KindOf(const InstanceHeader& image) { return {image.class_uid, IsLocaliser(image)}; }
+ObjectKind KindOf(const ImageHeader& image) { return {image.class_uid, IsLocaliser(image)}; }
 
-ObjectKind KindOfSlices(const std::vector<InstanceHeader>& objects) {
+ObjectKind KindOfSlices(const std::vector<ImageHeader>& objects) {
   const ObjectKind ct_slice = {std::string(kCtImageClass), false};
   std::map<ObjectKind, int> counts;
-  for (const InstanceHeader& object : objects) ++counts[KindOf(object)];
+  for (const ImageHeader& object : objects) ++counts[KindOf(object)];
   if (counts.contains(ct_slice)) return ct_slice;
   return std::max_element(counts.begin(), counts.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; })
       ->first;
 }
 
-bool StatesHounsfield(const InstanceHeader& image) {
+bool StatesHounsfield(const ImageHeader& image) {
   return image.rescale_slope.has_value() && image.rescale_intercept.has_value() &&
          (image.rescale_type.empty() || image.rescale_type == "HU");
 }
@@ -123,12 +123,12 @@ const char* PlaneName(SliceOrientation plane) {
 
 }  // namespace
 
-SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHeader>& objects) {
+SeriesFacts FactsOfSeries(const std::string& key, const std::vector<ImageHeader>& objects) {
   const ObjectKind kind = KindOfSlices(objects);
-  std::vector<InstanceHeader> images;
+  std::vector<ImageHeader> images;
   std::copy_if(objects.begin(), objects.end(), std::back_inserter(images),
-               [&kind](const InstanceHeader& object) { return KindOf(object) == kind; });
-  const InstanceHeader& first = images.front();
+               [&kind](const ImageHeader& object) { return KindOf(object) == kind; });
+  const ImageHeader& first = images.front();
   SeriesFacts facts = {.key = key,
                        .study_uid = first.study_uid,
                        .modality = first.modality,
@@ -141,7 +141,7 @@ SeriesFacts FactsOfSeries(const std::string& key, const std::vector<InstanceHead
                        .localiser = kind.second,
                        .multi_frame = IsCtClass(kind.first) && kind.first != kCtImageClass};
   std::set<std::string> frames;
-  for (const InstanceHeader& image : images) {
+  for (const ImageHeader& image : images) {
     frames.insert(image.frame_uid);
     facts.contrast = facts.contrast || !image.contrast.empty();
     facts.derived = facts.derived || absl::StartsWith(image.image_type, "DERIVED");

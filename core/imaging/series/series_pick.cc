@@ -1,14 +1,14 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/pacs_bridge/series/series_pick.h"
+#include "core/imaging/series/series_pick.h"
 
 #include <cmath>
 #include <optional>
 
 #include "absl/strings/str_cat.h"
 
-#include "client/pacs_bridge/series/series_objections.h"
+#include "core/imaging/series/series_objections.h"
 
 namespace tissueform {
 namespace {

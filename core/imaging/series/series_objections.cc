@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/pacs_bridge/series/series_objections.h"
+#include "core/imaging/series/series_objections.h"
 
 #include <algorithm>
 #include <utility>

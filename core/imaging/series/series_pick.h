@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "client/pacs_bridge/series/series_facts.h"
-#include "client/pacs_bridge/series/series_rules.h"
+#include "core/imaging/series/series_facts.h"
+#include "core/imaging/series/series_rules.h"
 
 namespace tissueform {
 

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/pacs_bridge/series/series_pick.h"
+#include "core/imaging/series/series_pick.h"
 
 #include <cmath>
 #include <functional>
@@ -9,8 +9,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "client/pacs_bridge/dicom/dicom_uid.h"
-#include "client/pacs_bridge/series/series_objections.h"
+#include "core/imaging/series/image_header.h"
+#include "core/imaging/series/series_objections.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
@@ -21,10 +21,10 @@ using ::testing::Not;
 using testing::StatusIs;
 
 // A head in axial slices, as a scanner sends it.
-std::vector<InstanceHeader> Head(int slices = 200, double spacing_mm = 0.8) {
-  std::vector<InstanceHeader> images;
+std::vector<ImageHeader> Head(int slices = 200, double spacing_mm = 0.8) {
+  std::vector<ImageHeader> images;
   for (int i = 0; i < slices; ++i) {
-    InstanceHeader image;
+    ImageHeader image;
     image.class_uid = std::string(kCtImageClass);
     image.study_uid = "1.2.3";
     image.series_uid = "1.2.3.4";
@@ -45,8 +45,8 @@ std::vector<InstanceHeader> Head(int slices = 200, double spacing_mm = 0.8) {
   return images;
 }
 
-SeriesFacts FactsAfter(const std::function<void(std::vector<InstanceHeader>*)>& change) {
-  std::vector<InstanceHeader> images = Head();
+SeriesFacts FactsAfter(const std::function<void(std::vector<ImageHeader>*)>& change) {
+  std::vector<ImageHeader> images = Head();
   change(&images);
   return FactsOfSeries("key", images);
 }
@@ -84,9 +84,9 @@ TEST(SeriesFactsTest, KernelsOfManufacturersAreSoftOrSharp) {
 
 TEST(SeriesFactsTest, ATiltedGantryIsAxialAndAReformattedSeriesIsNot) {
   const auto turn = [](double degrees) {
-    return FactsAfter([degrees](std::vector<InstanceHeader>* images) {
+    return FactsAfter([degrees](std::vector<ImageHeader>* images) {
       const double angle = degrees * M_PI / 180;
-      for (InstanceHeader& image : *images) {
+      for (ImageHeader& image : *images) {
         image.axes->col(1) = Eigen::Vector3d(0, std::cos(angle), -std::sin(angle));
       }
     });
@@ -98,7 +98,7 @@ TEST(SeriesFactsTest, ATiltedGantryIsAxialAndAReformattedSeriesIsNot) {
 
 struct Defect {
   const char* name;
-  std::function<void(std::vector<InstanceHeader>*)> change;
+  std::function<void(std::vector<ImageHeader>*)> change;
   const char* said;
 };
 
@@ -113,7 +113,7 @@ TEST_P(DefectTest, IsSaidAndNothingOfThePatient) {
   EXPECT_FALSE(PickSeries({facts}, {SomeRule()}).front().chosen);
 }
 
-using Images = std::vector<InstanceHeader>;
+using Images = std::vector<ImageHeader>;
 
 INSTANTIATE_TEST_SUITE_P(
     All, DefectTest,
@@ -131,14 +131,14 @@ INSTANTIATE_TEST_SUITE_P(
         Defect{"Thick", [](Images* i) { i->front().slice_thickness_mm = 5; }, "5.00 mm thick"},
         Defect{"Scout",
                [](Images* i) {
-                 for (InstanceHeader& image : *i) image.image_type = "ORIGINAL\\PRIMARY\\LOCALIZER";
+                 for (ImageHeader& image : *i) image.image_type = "ORIGINAL\\PRIMARY\\LOCALIZER";
                },
                "localizer"},
         Defect{"SomeWithoutHounsfield", [](Images* i) { (*i)[7].rescale_slope.reset(); },
                "1 of its 200 images have no Hounsfield calibration"},
         Defect{"MultiFrame",
                [](Images* i) {
-                 for (InstanceHeader& image : *i) {
+                 for (ImageHeader& image : *i) {
                    image.class_uid = std::string(kEnhancedCtImageClass);
                    image.rescale_slope.reset();
                    image.position.reset();
@@ -152,19 +152,19 @@ INSTANTIATE_TEST_SUITE_P(
                "its modality is unknown"},
         Defect{"ConeBeam",
                [](Images* i) {
-                 for (InstanceHeader& image : *i) image.rescale_slope.reset();
+                 for (ImageHeader& image : *i) image.rescale_slope.reset();
                },
                "cone-beam"},
         Defect{"NoPlaces",
                [](Images* i) {
-                 for (InstanceHeader& image : *i) image.position.reset();
+                 for (ImageHeader& image : *i) image.position.reset();
                },
                "it has 0 slices"}),
     [](const auto& defect) { return std::string(defect.param.name); });
 
 struct Stranger {
   const char* name;
-  std::function<void(InstanceHeader*)> change;
+  std::function<void(ImageHeader*)> change;
 };
 
 class StrangerTest : public ::testing::TestWithParam<Stranger> {};
@@ -172,7 +172,7 @@ class StrangerTest : public ::testing::TestWithParam<Stranger> {};
 TEST_P(StrangerTest, InASeriesOfCtSlicesIsLeftAsideWithANote) {
   for (const bool comes_first : {false, true}) {
     const SeriesFacts facts = FactsAfter([comes_first](Images* images) {
-      InstanceHeader stranger = images->front();
+      ImageHeader stranger = images->front();
       GetParam().change(&stranger);
       images->insert(comes_first ? images->begin() : images->end(), stranger);
     });
@@ -186,7 +186,7 @@ TEST_P(StrangerTest, InASeriesOfCtSlicesIsLeftAsideWithANote) {
   }
 }
 
-void MakeCapture(InstanceHeader* object) {
+void MakeCapture(ImageHeader* object) {
   *object = {.study_uid = object->study_uid,
              .series_uid = object->series_uid,
              .class_uid = "1.2.840.10008.5.1.4.1.1.7",
@@ -197,14 +197,14 @@ void MakeCapture(InstanceHeader* object) {
 INSTANTIATE_TEST_SUITE_P(All, StrangerTest,
                          ::testing::Values(Stranger{"Capture", MakeCapture},
                                            Stranger{"Report",
-                                                    [](InstanceHeader* object) {
+                                                    [](ImageHeader* object) {
                                                       MakeCapture(object);
                                                       object->class_uid =
                                                           "1.2.840.10008.5.1.4.1.1.88.67";
                                                       object->modality = "SR";
                                                     }},
                                            Stranger{"Scout",
-                                                    [](InstanceHeader* object) {
+                                                    [](ImageHeader* object) {
                                                       object->image_type =
                                                           "ORIGINAL\\PRIMARY\\LOCALIZER";
                                                       object->frame_uid = "9";
@@ -215,7 +215,7 @@ INSTANTIATE_TEST_SUITE_P(All, StrangerTest,
 
 TEST(SeriesFactsTest, WithoutCtSlicesTheMostFrequentKindCounts) {
   const SeriesFacts facts = FactsAfter([](Images* images) {
-    for (InstanceHeader& image : *images) {
+    for (ImageHeader& image : *images) {
       image.class_uid = "1.2.840.10008.5.1.4.1.1.4";
       image.modality = "MR";
     }
@@ -227,7 +227,7 @@ TEST(SeriesFactsTest, WithoutCtSlicesTheMostFrequentKindCounts) {
 
 TEST(PickSeriesTest, TheSofterKernelWinsAndTheOtherIsToldWhy) {
   SeriesFacts sharp = FactsAfter([](Images* images) {
-    for (InstanceHeader& image : *images) image.convolution_kernel = "H60s";
+    for (ImageHeader& image : *images) image.convolution_kernel = "H60s";
   });
   const std::vector<SeriesVerdict> verdicts =
       PickSeries({sharp, FactsOfSeries("soft", Head())}, {SomeRule()});

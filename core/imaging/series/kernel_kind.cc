@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/pacs_bridge/series/kernel_kind.h"
+#include "core/imaging/series/kernel_kind.h"
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/imaging/ct/dicom_file.h"
+#include "core/imaging/ct/dicom_header.h"
 
 #include <cmath>
 #include <cstdint>
