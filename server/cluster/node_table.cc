@@ -112,7 +112,7 @@ absl::Status NodeTable::Exchange() {
         }
         return absl::OkStatus();
       },
-      PostgresPool::Clock::now() + kPatience, PostgresPool::Idempotent::kNo);
+      PostgresPool::Clock::now() + kPatience, PostgresPool::Idempotent::kYes);
   MutexLock lock(mutex_);
   others_ = std::move(others);
   return status;

@@ -62,7 +62,7 @@ class PostgresCaseWriter final : public CaseWriter {
                       [this](int64_t offset, int64_t size) { return file_.ReadAt(offset, size); }));
           return KeepCaseRow(transaction, record(), most_);
         },
-        PostgresPool::Idempotent::kYes);
+        PostgresPool::Idempotent::kNo);
   }
 
  private:

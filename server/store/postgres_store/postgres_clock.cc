@@ -27,7 +27,7 @@ absl::Status PostgresClock::Ask() {
         ahead_ms_ = rows.Integer(0, 0) - SteadyMs();
         return absl::OkStatus();
       },
-      PostgresPool::Idempotent::kNo);
+      PostgresPool::Idempotent::kYes);
 }
 
 int64_t PostgresClock::NowS() const {

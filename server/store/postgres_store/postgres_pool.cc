@@ -123,7 +123,7 @@ absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline
     const bool unknown = outcome == PostgresOutcome::kUnknown;
     if (unknown) lost.Update(status);
     const bool again =
-        outcome == PostgresOutcome::kTransient || (unknown && idempotent == Idempotent::kNo);
+        outcome == PostgresOutcome::kTransient || (unknown && idempotent == Idempotent::kYes);
     if (!again) return status;
     if (!Pause(pause, tried, deadline)) return lost.ok() ? status : lost;
   }

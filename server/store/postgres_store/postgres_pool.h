@@ -48,11 +48,11 @@ class PostgresPool {
   // Errors: what `work` says, those of PostgresConnection, and Unavailable (all connections are in
   // use until then; the database is not there until then, for whatever reason). Those of the
   // database are logged, and have a sentence for clients (store_errors.h).
-  absl::Status Run(const Work& work, Idempotent idempotent = Idempotent::kYes) {
+  absl::Status Run(const Work& work, Idempotent idempotent = Idempotent::kNo) {
     return Run(work, Clock::now() + Patience(), idempotent);
   }
   absl::Status Run(const Work& work, Clock::time_point deadline,
-                   Idempotent idempotent = Idempotent::kYes);
+                   Idempotent idempotent = Idempotent::kNo);
 
   static constexpr std::chrono::milliseconds kMaxLate{1'000};
   static constexpr std::chrono::milliseconds kLeastAnswer{5'000};
@@ -108,7 +108,7 @@ class PostgresPool {
 template <typename Result>
 absl::StatusOr<Result> AskPool(
     PostgresPool* pool, const std::function<absl::StatusOr<Result>(PostgresTransaction&)>& work,
-    PostgresPool::Idempotent idempotent = PostgresPool::Idempotent::kNo) {
+    PostgresPool::Idempotent idempotent = PostgresPool::Idempotent::kYes) {
   absl::StatusOr<Result> result;
   const absl::Status status = pool->Run(
       [&](PostgresTransaction& transaction) {

@@ -35,7 +35,7 @@ SessionLease PostgresSessionLeases::LeaseFrom(std::chrono::steady_clock::time_po
 absl::Status PostgresSessionLeases::Run(const PostgresPool::Work& work) {
   // Who holds a session already keeps its epoch, and releases what it holds under that alone.
   return pool_->Run(work, PostgresPool::Clock::now() + options_.patience,
-                    PostgresPool::Idempotent::kNo);
+                    PostgresPool::Idempotent::kYes);
 }
 
 std::string PostgresSessionLeases::SeenTooLong(const std::string& session) {

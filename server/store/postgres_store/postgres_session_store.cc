@@ -68,7 +68,7 @@ void PostgresSessionStore::Create(SessionRecord record, int64_t epoch, RecordCal
         TF_ASSIGN_OR_RETURN(kept.epoch, InsertSession(transaction, record));
         return kept;
       },
-      Idempotent::kYes, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 namespace {
@@ -86,7 +86,7 @@ absl::StatusOr<SessionRecord> SelectSession(PostgresTransaction& transaction,
 void PostgresSessionStore::Get(const std::string& id, RecordCallback done) {
   Ask<SessionRecord>(
       id, [id](PostgresTransaction& transaction) { return SelectSession(transaction, id); },
-      Idempotent::kNo, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
@@ -100,7 +100,7 @@ void PostgresSessionStore::Peek(const std::string& id, RecordCallback done) {
           found = SelectSession(transaction, id);
           return found.status();
         },
-        deadline, Idempotent::kNo);
+        deadline, Idempotent::kYes);
     done(status.ok() ? std::move(found) : status);
   });
 }
@@ -123,7 +123,7 @@ void PostgresSessionStore::Update(SessionRecord record, int64_t epoch, RecordCal
         TF_RETURN_IF_ERROR(ReplaceSession(transaction, state.key, next));
         return next;
       },
-      Idempotent::kYes, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 // Under one epoch nobody else writes meanwhile, and later calls for this session wait: the same
@@ -136,7 +136,7 @@ void PostgresSessionStore::CommitPoses(const std::string& id, std::vector<Handle
        now_s = clock_()](PostgresTransaction& transaction) {
         return CommitRow(transaction, id, count, bytes, epoch, now_s);
       },
-      Idempotent::kNo, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 void PostgresSessionStore::Delete(const std::string& id, const std::string& etag, int64_t epoch,
@@ -148,7 +148,7 @@ void PostgresSessionStore::Delete(const std::string& id, const std::string& etag
         TF_RETURN_IF_ERROR(CheckSessionWrite(id, etag, epoch, state.etag, state.epoch));
         return transaction.Run("DELETE FROM sessions WHERE key = $1", {state.key});
       },
-      Idempotent::kYes, std::move(done));
+      Idempotent::kNo, std::move(done));
 }
 
 void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
@@ -170,7 +170,7 @@ void PostgresSessionStore::List(const ListRequest& request, PageCallback done) {
                                RowsOfPage(request.limit)}));
         return ReadPostgresPage<Page>(rows, request.limit, 0, ReadSessionColumns);
       },
-      Idempotent::kNo, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) {
@@ -185,7 +185,7 @@ void PostgresSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, St
             "session_states.key FOR UPDATE OF session_states)",
             {now_s, names});
       },
-      Idempotent::kNo, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback done) {
@@ -203,7 +203,7 @@ void PostgresSessionStore::ListUnused(int64_t before_s, int limit, PageCallback 
                               {before_s, int64_t{limit}}));
         return ReadPostgresPage<Page>(rows, limit, 0, ReadSessionColumns);
       },
-      Idempotent::kNo, std::move(done));
+      Idempotent::kYes, std::move(done));
 }
 
 }  // namespace tissueform
