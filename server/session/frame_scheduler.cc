@@ -8,20 +8,16 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/error_reason.h"
-#include "core/base/status_macros.h"
 
 namespace tissueform {
 
-absl::Status FrameScheduler::CheckSequence(uint64_t sequence) const {
-  if (!last_sequence_.has_value() || sequence > *last_sequence_) return absl::OkStatus();
-  return WithReason(
-      absl::InvalidArgumentError(absl::StrCat("sequence ", sequence, " after ", *last_sequence_,
-                                              "; sequences must rise from pose to pose")),
-      ErrorReason::kPoseSequenceNotRising);
-}
-
 absl::Status FrameScheduler::Put(uint64_t sequence, std::vector<HandlePose> poses) {
-  TF_RETURN_IF_ERROR(CheckSequence(sequence));
+  if (last_sequence_.has_value() && sequence <= *last_sequence_) {
+    return WithReason(
+        absl::InvalidArgumentError(absl::StrCat("sequence ", sequence, " after ", *last_sequence_,
+                                                "; sequences must rise from pose to pose")),
+        ErrorReason::kPoseSequenceNotRising);
+  }
   const int64_t coalesced_count = mailbox_.has_value() ? mailbox_->coalesced_count + 1 : 0;
   mailbox_ = {sequence, coalesced_count, std::move(poses), std::chrono::steady_clock::now()};
   if (measures_ != nullptr) {

@@ -63,7 +63,6 @@ class FrameScheduler {
 
   // The client. A pose replaces the one that waits. Errors: InvalidArgument when `sequence` does
   // not rise.
-  absl::Status CheckSequence(uint64_t sequence) const;
   absl::Status Put(uint64_t sequence, std::vector<HandlePose> poses);
   // Of the frame with this refinement and all before it; of all frames of the pose when left out.
   // Errors: InvalidArgument for a frame that was not made.

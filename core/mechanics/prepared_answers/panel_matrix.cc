@@ -76,7 +76,8 @@ inline __attribute__((always_inline)) void AddColumns(
     typename Block<kSet, kFactors>::Sums (&sums)[kPanels][Block<kSet, kFactors>::kRegisters]) {
   constexpr int kLanes = Register<kSet>::kLanes;
   const int32_t* const upper = of.upper + panel * of.cols * kPairs + first_register * kLanes;
-  const int32_t* const lower = of.lower + panel * of.full_cols * kPairs + first_register * kLanes;
+  const int32_t* const lower =
+      kIsFull ? of.lower + panel * of.full_cols * kPairs + first_register * kLanes : nullptr;
   const size_t only_upper = of.cols - of.full_cols;
   // What comes next: the processor's own look ahead ends at every page of 4 KiB.
   const size_t ahead = kPanels * of.cols * kPairs;
