@@ -58,7 +58,9 @@ def kept_secrets(folder):
 
 def run(folder, programs, port, metrics_port, options=("-euo", "pipefail")):
     """The commands, in a session of their own; the server that they leave running is of that, too."""
-    environment = {"PATH": f"{programs}:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": str(folder), "PORT": str(port), "METRICS": str(metrics_port), "LANG": "C.UTF-8"}
+    # With the options of sanitizers, whose suppressions a program that is started must know.
+    sanitizers = {name: value for name, value in os.environ.items() if name.endswith("SAN_OPTIONS")}
+    environment = {"PATH": f"{programs}:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": str(folder), "PORT": str(port), "METRICS": str(metrics_port), "LANG": "C.UTF-8", **sanitizers}
     with open(folder / "told", "w+") as told:
         shell = subprocess.Popen(["bash", *options, "-c", block()], cwd=folder, env=environment, stdout=told, stderr=subprocess.STDOUT, start_new_session=True)
         try:
