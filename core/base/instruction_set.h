@@ -68,9 +68,13 @@ struct KernelVersions {
   Function* avx512;
 
   Function* Active() const {
+#if defined(__x86_64__)
     const InstructionSet set = ActiveInstructionSet();
     if (set == InstructionSet::kAvx512) return avx512;
     return set == InstructionSet::kAvx2 ? avx2 : baseline;
+#else
+    return baseline;  // the others are not even linked: a page stays small
+#endif
   }
 };
 
