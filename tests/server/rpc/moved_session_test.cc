@@ -153,8 +153,10 @@ TEST_F(MovedSessionTest, ACommitUnderAnOldEpochEndsTheStreamAndIsNotKept) {
   const std::string session = MakeSession();
   const auto stream = Drag(session);
   Move(stream.get(), 1);
+  // Stopped before the other takes it, and goes on where it was: in between the stream could see
+  // that it has moved, and end before it commits.
+  here_.set_stopped(true);
   TakeOver(session);
-  here_.set_stopped(true);  // and goes on where it was
   v1::DeformRequest pose = Pose(2);
   pose.mutable_pose()->set_commit(true);
   stream->Send(pose);
