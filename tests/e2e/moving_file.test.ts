@@ -221,12 +221,12 @@ describe("in Chromium", () => {
     expect(errors).toEqual([]);
   });
 
-  test("a browser without what it needs is told so", async () => {
+  test("a browser that is too old gets a page that says so", async () => {
     const { page } = await openPage("face.html", "delete globalThis.DecompressionStream");
     await expect.poll(() => alertOf(page)).toContain("too old");
   });
 
-  test("a browser without WebAssembly is told so", async () => {
+  test("without WebAssembly the page says what it needs", async () => {
     const { page } = await openPage("face.html", "delete globalThis.WebAssembly");
     await expect.poll(() => alertOf(page)).toContain("it needs WebAssembly");
   });

@@ -17,21 +17,27 @@
 
 namespace tissueform::testing {
 
+// A socket that listens on a free port of loopback. Writes the URL of its root.
+inline int ListenOnLoopback(std::string* url) {
+  const int listener = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address = {};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(address);
+  auto* const any = reinterpret_cast<sockaddr*>(&address);
+  EXPECT_EQ(bind(listener, any, size), 0);
+  EXPECT_EQ(listen(listener, 1), 0);
+  getsockname(listener, any, &size);
+  *url = absl::StrCat("http://127.0.0.1:", ntohs(address.sin_port), "/");
+  return listener;
+}
+
 // An HTTP server on a free port of loopback that answers one request with the bytes it is given.
 class OneAnswer {
  public:
   // A request is complete when it ends with `end`.
   explicit OneAnswer(std::string answer, std::string end = "\r\n\r\n")
-      : end_(std::move(end)), listener_(socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address = {};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof(address);
-    auto* const any = reinterpret_cast<sockaddr*>(&address);
-    EXPECT_EQ(bind(listener_, any, size), 0);
-    EXPECT_EQ(listen(listener_, 1), 0);
-    getsockname(listener_, any, &size);
-    url_ = absl::StrCat("http://127.0.0.1:", ntohs(address.sin_port), "/");
+      : end_(std::move(end)), listener_(ListenOnLoopback(&url_)) {
     thread_ = std::thread([this, answer = std::move(answer)] { Serve(answer); });
   }
   ~OneAnswer() { EXPECT_FALSE(thread_.joinable()); }
@@ -54,8 +60,8 @@ class OneAnswer {
   }
 
   const std::string end_;
+  std::string url_;  // before the listener, which writes it
   const int listener_;
-  std::string url_;
   std::string request_;
   std::thread thread_;
 };

@@ -30,8 +30,8 @@ using TakeBody =
 // Errors: InvalidArgument when it is no URL, holds a password, or is http for another machine.
 absl::Status CheckPacsUrl(const PacsPeer& peer);
 
-// One request and its answer, whatever its status; its body is empty at status 200 (see `take`) and
-// otherwise the first 64 KiB. REQUIRES: CheckPacsUrl.
+// Sends one request. An answer of any status is returned: the body of status 200 goes to `take`, of
+// others the first 64 KiB are in the answer. REQUIRES: CheckPacsUrl.
 //
 // Errors: those of PacsClient, and of `take`.
 absl::StatusOr<HttpAnswer> Exchange(const PacsPeer& peer, const PacsHttpRequest& request,

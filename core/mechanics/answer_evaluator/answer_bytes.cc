@@ -65,7 +65,8 @@ uint32_t VersionOf(const PortableAnswers& answers) {
   return answers.third_lengths.empty() ? 1 : kAnswerFormatVersion;
 }
 
-// Matrices travel row by row. Of one its columns; 0 of what is none, or travels column by column.
+// The bytes hold some matrices row by row. Returns the number of columns of such a matrix, 0 for
+// all other sections.
 size_t MatrixColumns(const AnswerSizes& sizes, uint32_t section) {
   switch (section) {
     case 13:
@@ -85,7 +86,7 @@ size_t MatrixColumns(const AnswerSizes& sizes, uint32_t section) {
   }
 }
 
-// Of `lines` that lie one behind the other what lies across them.
+// Transposes a matrix that is stored as `lines` contiguous lines.
 template <typename Value>
 std::vector<Value> Transposed(const std::vector<Value>& values, size_t lines) {
   std::vector<Value> across;

@@ -96,7 +96,8 @@ PlannedReading PlanReading(const PortableAnswers& answers, const AnswerSizes& si
   }
   reading.error_mm = of_all + left_out + std::max(digits, 0.0);
   if (reading.error_mm <= tolerance_mm) return reading;
-  // All that there is: whoever asks all the same gets the best answer.
+  // Not within the tolerance: read everything, so that Evaluate, which may still be called, is as
+  // exact as it can be.
   reading = {.columns = {.first = 0, .first_full = only_upper}, .error_mm = of_all};
   for (size_t c = 0; c < only_upper; ++c) reading.error_mm += of_digits(c);
   return reading;

@@ -9,8 +9,8 @@
 namespace tissueform {
 namespace {
 
-// Rows that are summed at a time: their sums stay in the first-level cache, whatever the length of
-// the columns.
+// Rows that are summed at a time: their sums fit into the first-level cache for columns of any
+// length.
 constexpr size_t kRowsAtOnce = 1024;
 constexpr int32_t kUpper = 1 << 16;  // steps in one of the upper half
 

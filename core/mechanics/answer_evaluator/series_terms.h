@@ -35,7 +35,7 @@ std::vector<double> NumbersOf(const PortableAnswers& answers, std::span<const An
 // With a third order reads `second_lengths` and `third_lengths`.
 SeriesTerms TermsOf(const PortableAnswers& answers, std::vector<double> numbers);
 
-// What the series leaves out is told by its last order.
+// Estimates the error of truncating the series from its last order.
 //
 // Of first and second order:
 //   c (|u2| s2)^(3/4) / L^(1/2),   of third order in the pose,

@@ -29,7 +29,7 @@ export interface EvaluatorExports {
 
 const MOST_ANSWER_BYTES = 2 ** 28;
 
-/** Beyond this turn, 30 degrees, there is no band, whatever was prepared: linear elasticity takes the turn for strain. */
+/** No band for larger rotations (30 degrees), even if they were prepared: linear elasticity counts the rotation as strain. */
 export const LARGEST_BAND_ROTATION = 0.524;
 
 /** What poses give. */

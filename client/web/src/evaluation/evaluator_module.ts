@@ -38,7 +38,7 @@ async function compile(): Promise<WebAssembly.Module> {
   return module;
 }
 
-/** In a file that moves it lies in the page, whose content security policy allows no fetch. */
+/** A moving file contains it as a data URL, because its content security policy allows no fetch. */
 async function load(url: URL): Promise<Uint8Array<ArrayBuffer>> {
   if (url.protocol === "data:") return Uint8Array.from(atob(url.href.slice(url.href.indexOf(",") + 1)), (letter) => letter.charCodeAt(0));
   const reply = await fetch(url).catch(() => null);

@@ -31,7 +31,7 @@ test.each([
   expect(await page.evaluatorModule()).toBe(module);
 });
 
-test("a browser without WebAssembly is told so", async () => {
+test("a browser without WebAssembly gets an error that names it", async () => {
   vi.stubGlobal("WebAssembly", undefined);
   await expect(page.evaluatorModule()).rejects.toThrow("this browser has no WebAssembly, or it is switched off");
 });

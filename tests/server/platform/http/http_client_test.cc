@@ -11,9 +11,6 @@
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include "tests/testing/one_answer.h"
 
@@ -22,6 +19,7 @@ namespace {
 
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
+using testing::ListenOnLoopback;
 using ::testing::Not;
 using testing::OneAnswer;
 
@@ -32,24 +30,14 @@ constexpr char kNobody[] = "http://127.0.0.1:9/?secret";
 // Takes connections on loopback and never answers.
 class SilentServer {
  public:
-  SilentServer() : listener_(socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address = {};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof(address);
-    auto* const any = reinterpret_cast<sockaddr*>(&address);
-    EXPECT_EQ(bind(listener_, any, size), 0);
-    EXPECT_EQ(listen(listener_, 1), 0);
-    getsockname(listener_, any, &size);
-    url_ = absl::StrCat("http://127.0.0.1:", ntohs(address.sin_port), "/");
-  }
+  SilentServer() : listener_(ListenOnLoopback(&url_)) {}
   ~SilentServer() { close(listener_); }
 
   const std::string& url() const { return url_; }
 
  private:
+  std::string url_;  // before the listener, which writes it
   const int listener_;
-  std::string url_;
 };
 
 TEST(ReadUrl, TellsWhereSecretsMayGo) {
