@@ -87,6 +87,10 @@ bool IsLocalAddress(absl::string_view address) {
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeServerChannel(
     const std::string& address, const ConnectionOptions& options,
     const std::shared_ptr<TokenFile>& token, const grpc::ChannelArguments& arguments) {
+  if (absl::StartsWith(address, "http://") || absl::StartsWith(address, "https://")) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(address, " is a URL; give HOST:PORT or unix:/PATH"));
+  }
   if (!options.encrypted() && !IsLocalAddress(address)) {
     if (token != nullptr) {
       return absl::FailedPreconditionError(

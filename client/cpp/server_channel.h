@@ -22,8 +22,8 @@ bool IsLocalAddress(absl::string_view address);
 
 // What gRPC is given to reach `address`. Sends nothing.
 //
-// Errors: FailedPrecondition (not encrypted and off this machine without `insecure`; a token that
-// would be sent there unencrypted), those of the files.
+// Errors: InvalidArgument (the address is a URL), FailedPrecondition (not encrypted and off this
+// machine without `insecure`; a token that would be sent there unencrypted), those of the files.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeServerChannel(
     const std::string& address, const ConnectionOptions& options,
     const std::shared_ptr<TokenFile>& token, const grpc::ChannelArguments& arguments);

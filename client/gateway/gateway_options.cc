@@ -113,12 +113,13 @@ void AddUpstreamOptions(CLI::App& app, GatewayOptions* options) {
       ->type_name("ADDRESS");
 }
 
-// "unix:/PATH", or "HOST:PORT" with a host that has no "=".
+// "unix:/PATH", or "HOST:PORT" with a host that has no "=" and, as a URL would, no "/".
 bool IsAddress(absl::string_view text) {
   if (absl::StartsWith(text, "unix:")) return true;
   const size_t colon = text.rfind(':');
   int port = 0;
-  return colon != absl::string_view::npos && colon > 0 && !absl::StrContains(text, '=') &&
+  return colon != absl::string_view::npos && colon > 0 &&
+         text.find_first_of("=/") == absl::string_view::npos &&
          absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port <= kMaxPort;
 }
 
@@ -132,7 +133,7 @@ std::string SetServer(const std::vector<std::string>& addresses, GatewayOptions*
   if (!IsAddress(address)) {
     const bool names_node = absl::StrContains(address, '=');
     return absl::StrCat(address, names_node ? " names a node: " : " is not an address: ",
-                        names_node ? kOneAddress : "give HOST:PORT or unix:/PATH");
+                        names_node ? kOneAddress : "give HOST:PORT without http://, or unix:/PATH");
   }
   options->server = address;
   return {};

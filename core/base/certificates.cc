@@ -42,6 +42,10 @@ Bio BioOf(absl::string_view text) {
   return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
 }
 
+absl::Status NoCertificate() {
+  return absl::InvalidArgumentError("has no certificate in PEM (\"-----BEGIN CERTIFICATE-----\")");
+}
+
 // Never asks a terminal for the password of an encrypted key.
 int NoPassword(char*, int, int, void*) { return -1; }
 
@@ -147,8 +151,7 @@ absl::StatusOr<std::string> ReadSecretPemFile(const std::string& path) {
 absl::StatusOr<CertificateFacts> ReadCertificate(absl::string_view chain_pem) {
   const Certificate certificate = FirstCertificate(chain_pem);
   if (certificate == nullptr) {
-    return absl::InvalidArgumentError(
-        "has no certificate in PEM (\"-----BEGIN CERTIFICATE-----\")");
+    return NoCertificate();
   }
   return CertificateFacts{.not_before = TimeOf(X509_get0_notBefore(certificate.get())),
                           .not_after = TimeOf(X509_get0_notAfter(certificate.get())),
@@ -184,9 +187,10 @@ absl::Status CheckAuthorities(absl::string_view pem) {
   // How reading a good file ends, too.
   const bool at_end = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
   ERR_clear_error();
-  if (count == 0 || !at_end) {
+  if (count == 0 && at_end) return NoCertificate();
+  if (!at_end) {
     return absl::InvalidArgumentError(
-        absl::StrCat("has no certificate in PEM after the ", count, " that could be read"));
+        absl::StrCat("certificate ", count + 1, " cannot be read as PEM"));
   }
   return absl::OkStatus();
 }

@@ -62,6 +62,14 @@ TEST_F(ServerChannelTest, AnotherMachineIsReachedEncryptedUnlessItIsSaid) {
   EXPECT_THAT(Make("192.0.2.1:1", {.tls = true}), IsOk());
 }
 
+// A reason that is true, and no advice to send anything unencrypted.
+TEST_F(ServerChannelTest, AUrlIsNotAnAddress) {
+  for (const char* url : {"http://127.0.0.1:1", "https://example.org:1"}) {
+    EXPECT_THAT(Make(url, {}), StatusIs(kInvalid, HasSubstr("give HOST:PORT"))) << url;
+    EXPECT_THAT(Make(url, {.tls = true}), StatusIs(kInvalid, HasSubstr("give HOST:PORT"))) << url;
+  }
+}
+
 TEST_F(ServerChannelTest, FilesAreCheckedBeforeAnythingIsSent) {
   const TestAuthority authority;
   const TestFiles files = authority.IssueFiles(folder_, "client");

@@ -56,7 +56,7 @@ TEST(GatewayOptions, SeveralServersAreHaproxys) {
 
 TEST(GatewayOptions, WhatIsNotAnAddressIsRefused) {
   EXPECT_NE(Parse("").error, "");
-  for (const char* text : {"a", ":1", "a:0", "a:65536", "a:b"}) {
+  for (const char* text : {"a", ":1", "a:0", "a:65536", "a:b", "http://127.0.0.1:1", "a/b:1"}) {
     EXPECT_THAT(Parse(std::string("--server ") + text).error, HasSubstr("give HOST:PORT")) << text;
   }
 }
