@@ -45,7 +45,7 @@ class Cluster:
     """One cluster by its state folder."""
 
     def __init__(self, folder, programs, web=None):
-        self.folder, self.programs = pathlib.Path(folder).absolute(), pathlib.Path(programs)
+        self.folder, self.programs = pathlib.Path(folder).absolute(), pathlib.Path(programs).absolute()
         self.web = pathlib.Path(web) if web is not None and pathlib.Path(web, "index.html").exists() else None
         self.state = {}
         if self.state_file.exists():
