@@ -55,9 +55,18 @@ def changed_files(root, commit):
     return {path for path in listed.split("\0") if path}
 
 
+def read_commands(build):
+    """{entry: words of its command}. From the files that CMake writes, since ctest tells no command of a program that is not
+    built yet."""
+    text = "".join(path.read_text(encoding="utf-8") for path in build.rglob("CTestTestfile.cmake"))
+    entries = re.findall(r"^add_test\(\[=\[(.+?)\]=\](.*)\)$", text, re.MULTILINE)
+    return {name: re.findall(r'"((?:[^"\\]|\\.)*)"', words) for name, words in entries}
+
+
 def read_entries(build):
+    commands = read_commands(build)
     for test in json.loads(run("ctest", "--test-dir", str(build), "--show-only=json-v1"))["tests"]:
-        words = test.get("command", [])
+        words = commands[test["name"]]
         properties = {each["name"]: each["value"] for each in test["properties"]}
         program = next((pathlib.PurePath(word).name for word in words if word.endswith("_test")), "")
         folder = pathlib.Path(properties["WORKING_DIRECTORY"])

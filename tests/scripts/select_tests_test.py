@@ -3,6 +3,8 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """select_tests.py selects every test that a change can affect."""
 
+import pathlib
+import tempfile
 import unittest
 
 import select_tests
@@ -79,6 +81,20 @@ class Select(unittest.TestCase):
 
     def test_scripts_of_ci_select_the_quick_scripts_only(self):
         self.assertEqual(selected("tests/scripts/check_style.py", ".ci/run"), [STYLE])
+
+
+class ReadEntries(unittest.TestCase):
+    def test_a_program_that_is_not_built_is_a_target_all_the_same(self):
+        with tempfile.TemporaryDirectory() as folder:
+            build = pathlib.Path(folder).resolve()
+            (build / "CTestTestfile.cmake").write_text(
+                f'add_test([=[core_mesh]=] "{build}/bin/core_mesh_test" "--output=a (b).xml")\n'
+                f'set_tests_properties([=[core_mesh]=] PROPERTIES LABELS "server" WORKING_DIRECTORY "{build}/tests/core/mesh")\n'
+                f'add_test([=[cluster.chaos]=] "python3" "chaos.py" "{build}/bin/a")\n'
+                f'set_tests_properties([=[cluster.chaos]=] PROPERTIES WORKING_DIRECTORY "{build}/tests/cluster")\n', encoding="utf-8")
+            mesh, chaos = select_tests.read_entries(build)
+        self.assertEqual((mesh.target, mesh.folder, mesh.labels), ("core_mesh_test", "tests/core/mesh", ["server"]))
+        self.assertEqual((chaos.target, chaos.starts_programs), ("", True))
 
 
 class Targets(unittest.TestCase):

@@ -41,8 +41,15 @@ def results_of_ctest(root, programs):
             continue
         if name in programs and programs[name]:
             continue  # its own file names the test that failed
-        outcome = {"run": "run", "fail": "failed"}.get(status, "skipped")
-        yield Result(name, float(case.get("time") or 0), outcome, "" if outcome != "skipped" else "the program reports that something is missing")
+        outcome, reason = {"run": "run", "fail": "failed"}.get(status, "skipped"), ""
+        if outcome == "skipped":
+            skipped = case.find("skipped")
+            reason = skipped.get("message", "") if skipped is not None else ""
+            if reason.startswith("SKIP_"):
+                reason = "the program reports that something is missing"
+            else:
+                outcome = "failed"  # such as a program that is not built
+        yield Result(name, float(case.get("time") or 0), outcome, reason)
 
 
 def read_results(folder):

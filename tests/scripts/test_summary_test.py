@@ -20,7 +20,8 @@ CTEST = """<testsuite>
 <testcase name="core_crashed" classname="core_crashed" time="3" status="fail"/>
 <testcase name="core_b" classname="core_b" time="3" status="run"/>
 <testcase name="e2e.a" classname="e2e.a" time="9" status="run"/>
-<testcase name="pacs.a" classname="pacs.a" time="0" status="notrun"><skipped message=""/></testcase>
+<testcase name="pacs.a" classname="pacs.a" time="0" status="notrun"><skipped message="SKIP_RETURN_CODE=77"/></testcase>
+<testcase name="e2e.b" classname="e2e.b" time="0" status="notrun"><skipped message="Unable to find executable"/></testcase>
 </testsuite>"""
 
 
@@ -42,14 +43,15 @@ class TestSummaryTest(unittest.TestCase):
         self.assertEqual(self.names("run"), ["core_a.A.Runs", "e2e.a"])
         self.assertEqual(self.names("skipped"), ["core_a.A.Skips", "pacs.a"])
 
-    def test_names_the_test_that_failed_and_the_program_that_crashed(self):
-        self.assertEqual(self.names("failed"), ["core_a.A.Fails", "core_crashed"])
+    def test_names_the_test_that_failed_the_program_that_crashed_and_what_could_not_start(self):
+        self.assertEqual(self.names("failed"), ["core_a.A.Fails", "core_crashed", "e2e.b"])
 
     def test_prints_reasons_and_the_slowest_first(self):
         text = test_summary.summary(self.results)
         self.assertIn("core_a.A.Skips: a.cc:1 no PostgreSQL", text)
+        self.assertIn("e2e.b: Unable to find executable", text)
         self.assertLess(text.index("9.0 s  e2e.a"), text.index("2.5 s  core_a.A.Runs"))
-        self.assertTrue(text.endswith("6 tests: 2 passed, 2 failed, 2 skipped"))
+        self.assertTrue(text.endswith("7 tests: 2 passed, 3 failed, 2 skipped"))
 
 
 if __name__ == "__main__":
