@@ -170,7 +170,7 @@ class WatchedStores final : public Stores {
   UploadStore& uploads() override { return stores_->uploads(); }
   PredictionStore& predictions() override { return predictions_; }
   CaseStore& cases() override { return cases_; }
-  CommitThread* commit_thread() override { return stores_->commit_thread(); }
+  SqlDatabase& database() override { return stores_->database(); }
   bool keeps() const override { return stores_->keeps(); }
   int64_t NowS() const override { return stores_->NowS(); }
   absl::Status AskTime() override { return stores_->AskTime(); }

@@ -13,10 +13,9 @@
 #include "core/base/status_macros.h"
 #include "server/platform/storage/data_folder.h"
 #include "server/session/worker_pool.h"
+#include "server/store/access_store/sql_access_store.h"
 #include "server/store/durable_store.h"
-#include "server/store/in_memory_stores.h"
-#include "server/store/postgres_store/postgres_access_store.h"
-#include "server/store/postgres_store/postgres_export_store.h"
+#include "server/store/sql_stores.h"
 
 namespace tissueform {
 namespace {
@@ -68,18 +67,14 @@ absl::StatusOr<OpenedStores> OpenStores(const ServerOptions& options) {
     }
     TF_ASSIGN_OR_RETURN(std::unique_ptr<PostgresStores> stores, OpenPatiently(options.cluster));
     opened.shared = stores.get();
-    opened.access = std::make_unique<PostgresAccessStore>(stores->pool());
-    opened.exports = std::make_unique<PostgresExportStore>(stores->pool());
     opened.stores = std::move(stores);
-    return opened;
-  }
-  if (options.in_memory) {
+  } else if (options.in_memory) {
     TF_ASSIGN_OR_RETURN(opened.stores, OpenInMemoryStores());
   } else {
     TF_ASSIGN_OR_RETURN(opened.stores, OpenFolder(options));
   }
-  opened.access = OpenAccessStore(opened.stores.get());
-  opened.exports = OpenExportStore(opened.stores.get());
+  opened.access = std::make_unique<SqlAccessStore>(&opened.stores->database());
+  opened.exports = std::make_unique<SqlExportStore>(&opened.stores->database());
   return opened;
 }
 

@@ -99,7 +99,7 @@ absl::Status NodeTable::Exchange() {
             "DELETE FROM nodes WHERE seen < tissueform_now() - $1::bigint * interval '1 second'",
             {kForgottenAfterS}));
         TF_ASSIGN_OR_RETURN(
-            const PostgresRows rows,
+            const SqlRows rows,
             transaction.Query("SELECT name, free_bytes, draining::int, (seen > tissueform_now() - "
                               "$3::bigint * interval '1 second')::int FROM nodes WHERE holder <> "
                               "$1 AND seen > tissueform_now() - $2::bigint * interval '1 second'",

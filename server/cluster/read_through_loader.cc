@@ -17,7 +17,12 @@ constexpr size_t kMaxRemembered = 10'000;
 }  // namespace
 
 ReadThroughLoader::ReadThroughLoader(PostgresPool* pool)
-    : sessions_(pool, SystemUnixSeconds), predictions_(pool), cases_(pool), rows_(pool) {}
+    : blobs_(pool),
+      database_(pool),
+      sessions_(&database_, SystemUnixSeconds),
+      predictions_(&database_, &blobs_),
+      cases_(&database_, &blobs_),
+      rows_(&database_) {}
 
 absl::StatusOr<FoundRows> ReadThroughLoader::ReadRow(const RowName& row) {
   FoundRows found;

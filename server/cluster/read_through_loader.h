@@ -13,11 +13,13 @@
 
 #include "core/base/mutex.h"
 #include "server/access/row_reader.h"
-#include "server/store/postgres_store/postgres_access_store.h"
-#include "server/store/postgres_store/postgres_case_store.h"
+#include "server/store/access_store/sql_access_store.h"
+#include "server/store/postgres_store/postgres_blobs.h"
+#include "server/store/postgres_store/postgres_database.h"
 #include "server/store/postgres_store/postgres_pool.h"
-#include "server/store/postgres_store/postgres_prediction_store.h"
-#include "server/store/postgres_store/postgres_session_store.h"
+#include "server/store/sql_case_store.h"
+#include "server/store/sql_prediction_store.h"
+#include "server/store/sql_session_store.h"
 
 namespace tissueform {
 
@@ -59,10 +61,12 @@ class ReadThroughLoader final : public RowReader {
   absl::Status Read(const RowName& row, FoundRows* found);
   absl::Status ReadSession(const std::string& id, FoundRows* found);
 
-  PostgresSessionStore sessions_;
-  PostgresPredictionStore predictions_;
-  PostgresCaseStore cases_;
-  PostgresAccessStore rows_;
+  PostgresBlobs blobs_;
+  PostgresDatabase database_;
+  SqlSessionStore sessions_;
+  SqlPredictionStore predictions_;
+  SqlCaseStore cases_;
+  SqlAccessStore rows_;
 
   mutable Mutex mutex_;
   ConditionVariable place_;

@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,7 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/exports/export_record.h"
-#include "server/store/stores.h"
+#include "server/store/sql_database.h"
 
 namespace tissueform {
 
@@ -25,17 +24,27 @@ class ExportStore {
   // All, by id, rising. Damaged ones are passed over. Errors: what the disk says.
   virtual absl::StatusOr<std::vector<ExportRecord>> Load() = 0;
 
-  // In place of the one with its id. Errors: Aborted (STALE_ETAG: where several servers write, the
-  // one that is kept is not of the version before), ResourceExhausted (the disk is full), or what
-  // the disk says.
+  // In place of the one with its id. Errors: Aborted (STALE_ETAG: the one that is kept is not of
+  // the version before: another server has changed it), ResourceExhausted (the disk is full), or
+  // what the disk says.
   virtual absl::Status Put(const ExportRecord& record) = 0;
 
   // All or none; one that is not there is none. Errors: what the disk says.
   virtual absl::Status Erase(const std::vector<std::string>& ids) = 0;
 };
 
-// Beside the other rows of `stores`, which must outlive it; in memory where those are. REQUIRES:
-// stores that keep have a commit thread (those of PostgreSQL have a PostgresExportStore).
-std::unique_ptr<ExportStore> OpenExportStore(Stores* stores);
+// Sealed rows (store_schema.h).
+class SqlExportStore final : public ExportStore {
+ public:
+  // `database` must outlive it.
+  explicit SqlExportStore(SqlDatabase* database) : database_(database) {}
+
+  absl::StatusOr<std::vector<ExportRecord>> Load() override;
+  absl::Status Put(const ExportRecord& record) override;
+  absl::Status Erase(const std::vector<std::string>& ids) override;
+
+ private:
+  SqlDatabase* const database_;
+};
 
 }  // namespace tissueform

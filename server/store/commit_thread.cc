@@ -20,10 +20,17 @@ constexpr std::chrono::seconds kTruncateAgain{1};
 
 }  // namespace
 
-CommitThread::CommitThread(std::unique_ptr<Database> database, std::function<absl::Status()> check)
-    : database_(std::move(database)), check_(std::move(check)), thread_([this] { Loop(); }) {}
+CommitThread::CommitThread(std::unique_ptr<Database> database, std::unique_ptr<Database> reader,
+                           std::function<absl::Status()> check)
+    : database_(std::move(database)),
+      check_(std::move(check)),
+      reader_(std::move(reader)),
+      thread_([this] { Loop(); }) {}
+
+CommitThread::CommitThread(std::unique_ptr<Database> in_memory) : database_(std::move(in_memory)) {}
 
 CommitThread::~CommitThread() {
+  if (in_memory()) return;
   {
     MutexLock lock(mutex_);
     ending_ = true;
@@ -33,6 +40,11 @@ CommitThread::~CommitThread() {
 }
 
 void CommitThread::Submit(Job job) {
+  if (in_memory()) {
+    absl::Status status = CommitHere(job);
+    if (job.done) job.done(std::move(status));
+    return;
+  }
   job.submitted = std::chrono::steady_clock::now();
   {
     MutexLock lock(mutex_);
@@ -42,6 +54,7 @@ void CommitThread::Submit(Job job) {
 }
 
 absl::Status CommitThread::Run(Job job) {
+  if (in_memory()) return CommitHere(job);
   if (std::this_thread::get_id() == thread_.get_id()) {
     return absl::InternalError("store: a blocking call on the store's own thread");
   }
@@ -50,6 +63,24 @@ absl::Status CommitThread::Run(Job job) {
   job.done = [&answer](absl::Status status) { answer.set_value(std::move(status)); };
   Submit(std::move(job));
   return future.get();
+}
+
+absl::Status CommitThread::CommitHere(Job& job) {
+  MutexLock lock(mutex_);
+  TF_RETURN_IF_ERROR(CommitAlone(job));
+  return job.after ? job.after(*database_) : absl::OkStatus();
+}
+
+absl::Status CommitThread::Read(const std::function<absl::Status(Database&)>& work) {
+  if (in_memory()) return Run({.work = work});
+  const auto begin = std::chrono::steady_clock::now();
+  absl::Status status;
+  {
+    MutexLock lock(reader_mutex_);
+    status = work(*reader_);
+  }
+  latency_.Observe(std::chrono::steady_clock::now() - begin);
+  return status;
 }
 
 void CommitThread::Loop() {
@@ -137,7 +168,11 @@ absl::Status CommitThread::CommitAlone(Job& job) {
 
 void CommitThread::TruncateLog() {
   TF_FAULT_POINT("commit.before_truncation");
-  const absl::StatusOr<bool> truncated = database_->TruncateLog();
+  absl::StatusOr<bool> truncated = false;
+  {
+    MutexLock lock(reader_mutex_);
+    truncated = database_->TruncateLog();
+  }
   TF_FAULT_POINT("commit.truncated");
   log_holds_erased_ = !truncated.ok() || !*truncated;
 }

@@ -38,8 +38,13 @@ class CommitThread {
     std::chrono::steady_clock::time_point submitted = {};  // set by Submit
   };
 
-  // `check` is asked after every commit; its error is the answer to all that was in it.
-  CommitThread(std::unique_ptr<Database> database, std::function<absl::Status()> check);
+  // `check` is asked after every commit; its error is the answer to all that was in it. `reader` is
+  // another connection, which only reads.
+  CommitThread(std::unique_ptr<Database> database, std::unique_ptr<Database> reader,
+               std::function<absl::Status()> check);
+  // For a database in memory, whose commits cost nothing that could be shared: there is no thread,
+  // and jobs run where they are submitted, one at a time.
+  explicit CommitThread(std::unique_ptr<Database> in_memory);
   // Answers all that was submitted.
   ~CommitThread();
   CommitThread(const CommitThread&) = delete;
@@ -50,7 +55,13 @@ class CommitThread {
   // Submits and waits. Any thread but its own, where it is an Internal error.
   absl::Status Run(Job job);
 
-  // Of each job, from Submit to its answer.
+  // Reads what was committed, beside the thread and what waits for it; in memory as Run. Any
+  // thread. `work` may open a transaction and must end it.
+  absl::Status Read(const std::function<absl::Status(Database&)>& work);
+  // Whether there is no thread.
+  bool in_memory() const { return !thread_.joinable(); }
+
+  // Of each job, from Submit to its answer, and of each Read.
   const DurationHistogram& latency() const { return latency_; }
 
  private:
@@ -61,12 +72,17 @@ class CommitThread {
   // Answers of `jobs` in one transaction. Not OK when the transaction has failed as a whole.
   absl::Status CommitTogether(std::vector<Job>& jobs, std::vector<absl::Status>* answers);
   absl::Status CommitAlone(Job& job);
+  absl::Status CommitHere(Job& job) ABSL_LOCKS_EXCLUDED(mutex_);
   void TruncateLog();
 
   // The thread's.
   const std::unique_ptr<Database> database_;
   const std::function<absl::Status()> check_;
   bool log_holds_erased_ = false;
+
+  // Held while the log is truncated, too: a reader in the way would keep what was deleted in it.
+  Mutex reader_mutex_;
+  const std::unique_ptr<Database> reader_ ABSL_PT_GUARDED_BY(reader_mutex_);  // null: in memory
 
   DurationHistogram latency_;
 

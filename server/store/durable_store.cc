@@ -11,10 +11,8 @@
 #include "core/base/status_macros.h"
 #include "server/platform/storage/durable_file.h"
 #include "server/store/blob_store.h"
-#include "server/store/commit_thread.h"
-#include "server/store/durable_blob_stores.h"
-#include "server/store/durable_case_store.h"
-#include "server/store/durable_session_store.h"
+#include "server/store/sqlite_blobs.h"
+#include "server/store/sqlite_database.h"
 #include "server/store/store_check.h"
 
 namespace tissueform {
@@ -42,28 +40,20 @@ std::function<absl::Status()> StillThere(const DataFolder& folder) {
 
 // In the order in which they need each other.
 struct DurableStore::Parts {
-  Parts(DataFolder its_folder, std::unique_ptr<BlobStore> its_blobs,
-        std::unique_ptr<UploadStore> its_uploads, std::unique_ptr<Database> database,
-        UnixClock clock, std::vector<DamagedItem> its_damaged)
+  Parts(DataFolder its_folder, std::unique_ptr<BlobStore> its_files,
+        std::unique_ptr<Database> opened, std::unique_ptr<Database> reader,
+        std::vector<DamagedItem> its_damaged)
       : folder(std::move(its_folder)),
-        blobs(std::move(its_blobs)),
-        uploads(std::move(its_uploads)),
+        files(std::move(its_files)),
         damaged(std::move(its_damaged)),
-        thread(std::move(database), StillThere(folder)),
-        sessions(&thread, std::move(clock)),
-        meshes(&thread, blobs.get()),
-        predictions(&thread, blobs.get()),
-        cases(&thread, blobs.get()) {}
+        database(std::move(opened), std::move(reader), StillThere(folder)),
+        blobs(&database, files.get()) {}
 
   const DataFolder folder;
-  const std::unique_ptr<BlobStore> blobs;
-  const std::unique_ptr<UploadStore> uploads;
+  const std::unique_ptr<BlobStore> files;
   const std::vector<DamagedItem> damaged;
-  CommitThread thread;
-  DurableSessionStore sessions;
-  DurableMeshStore meshes;
-  DurablePredictionStore predictions;
-  DurableCaseStore cases;
+  SqliteDatabase database;
+  SqliteBlobs blobs;
 };
 
 absl::StatusOr<std::unique_ptr<DurableStore>> DurableStore::Open(DataFolder folder,
@@ -82,22 +72,22 @@ absl::StatusOr<std::unique_ptr<DurableStore>> DurableStore::Open(DataFolder fold
   TF_RETURN_IF_ERROR(opened.database->TruncateLog().status());
   // The names of the database and of the two folders.
   TF_RETURN_IF_ERROR(SyncFolder(folder.path()));
-  return std::unique_ptr<DurableStore>(new DurableStore(std::make_unique<Parts>(
-      std::move(folder), std::move(blobs), std::move(uploads), std::move(opened.database),
-      std::move(options.clock), std::move(damaged))));
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<Database> reader,
+                      Database::OpenForReading(folder.database()));
+  auto parts =
+      std::make_unique<Parts>(std::move(folder), std::move(blobs), std::move(opened.database),
+                              std::move(reader), std::move(damaged));
+  return std::unique_ptr<DurableStore>(
+      new DurableStore(std::move(parts), std::move(uploads), std::move(options.clock)));
 }
 
-DurableStore::DurableStore(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+DurableStore::DurableStore(std::unique_ptr<Parts> parts, std::unique_ptr<UploadStore> uploads,
+                           UnixClock clock)
+    : SqlStores(&parts->database, &parts->blobs, std::move(uploads), std::move(clock)),
+      parts_(std::move(parts)) {}
 DurableStore::~DurableStore() = default;
 
-SessionStore& DurableStore::sessions() { return parts_->sessions; }
-MeshStore& DurableStore::meshes() { return parts_->meshes; }
-UploadStore& DurableStore::uploads() { return *parts_->uploads; }
-PredictionStore& DurableStore::predictions() { return parts_->predictions; }
-CaseStore& DurableStore::cases() { return parts_->cases; }
-const DurationHistogram* DurableStore::latency() const { return &parts_->thread.latency(); }
 std::string DurableStore::folder() const { return parts_->folder.path(); }
-CommitThread* DurableStore::commit_thread() { return &parts_->thread; }
 const std::vector<DamagedItem>& DurableStore::damaged() const { return parts_->damaged; }
 
 }  // namespace tissueform

@@ -11,7 +11,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/platform/storage/data_folder.h"
-#include "server/store/stores.h"
+#include "server/store/sql_stores.h"
 
 namespace tissueform {
 
@@ -33,10 +33,10 @@ struct DurableStoreOptions {
 // What the server keeps for good: rows in one SQLite database, meshes, positions and cases as files
 // beside it (docs/operations.md, "Stored data").
 //
-// One thread writes and reads rows, in the order of the calls; what waits is committed together. A
-// call is answered after its commit, on that thread for SessionStore. From such an answer the
-// blocking stores must not be called: they would wait for themselves.
-class DurableStore final : public Stores {
+// One thread writes rows, in the order of the calls; what waits is committed together. A call is
+// answered after its commit, on that thread for SessionStore. From such an answer the blocking
+// stores must not be called: they would wait for themselves.
+class DurableStore final : public SqlStores {
  public:
   // Opens the store, or makes it. A store of a version before is brought to this one's. Checks
   // all of it: what is damaged is moved to the folder `damaged` and stands in damaged(), the rest
@@ -49,14 +49,7 @@ class DurableStore final : public Stores {
 
   ~DurableStore() override;
 
-  SessionStore& sessions() override;
-  MeshStore& meshes() override;
-  UploadStore& uploads() override;
-  PredictionStore& predictions() override;
-  CaseStore& cases() override;
-  const DurationHistogram* latency() const override;
   std::string folder() const override;
-  CommitThread* commit_thread() override;
   bool keeps() const override { return true; }
 
   const std::vector<DamagedItem>& damaged() const;
@@ -64,7 +57,7 @@ class DurableStore final : public Stores {
  private:
   struct Parts;
 
-  explicit DurableStore(std::unique_ptr<Parts> parts);
+  DurableStore(std::unique_ptr<Parts> parts, std::unique_ptr<UploadStore> uploads, UnixClock clock);
 
   const std::unique_ptr<Parts> parts_;
 };

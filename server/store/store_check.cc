@@ -16,14 +16,57 @@
 
 #include "core/base/status_macros.h"
 #include "server/platform/storage/durable_file.h"
-#include "server/store/claimed_blobs.h"
-#include "server/store/durable_blob_stores.h"
 #include "server/store/session_record.h"
+#include "server/store/sql_case_store.h"
+#include "server/store/sql_mesh_store.h"
+#include "server/store/sql_prediction_store.h"
+#include "server/store/sqlite_blobs.h"
 #include "server/store/store_rows.h"
 #include "server/store/store_schema.h"
 
 namespace tissueform {
 namespace {
+
+// With the key first, and sessions that have lost their state, too.
+constexpr char kSessions[] =
+    "SELECT sessions.key, id, owner, record, etag, epoch, handles, poses, created_s, last_used_s "
+    "FROM sessions LEFT JOIN session_states ON session_states.key = sessions.key";
+constexpr char kMeshes[] = "SELECT key, sha256, record, last_used_s FROM meshes";
+constexpr char kPredictions[] =
+    "SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions";
+constexpr char kCases[] = "SELECT key, sha256, owner, record, last_used_s FROM cases";
+
+SessionRow ToSessionRow(const Database::Query& row) {
+  return {.id = row.Text(1),
+          .owner = row.Text(2),
+          .record = row.Bytes(3),
+          .etag = row.Text(4),
+          .epoch = row.Integer(5),
+          .handles = row.Integer(6),
+          .poses = row.Bytes(7),
+          .created_s = row.Integer(8),
+          .last_used_s = row.Integer(9)};
+}
+
+absl::StatusOr<PredictionRow> ToPrediction(const Database::Query& row) {
+  return PredictionOf({.id = row.Text(1),
+                       .owner = row.Text(2),
+                       .session = row.Text(3),
+                       .positions_sha256 = row.Text(4),
+                       .record = row.Bytes(5),
+                       .case_sha256 = row.Text(6)});
+}
+
+absl::StatusOr<CaseRecord> ToCase(const Database::Query& row) {
+  return CaseOf({.sha256 = row.Text(1),
+                 .owner = row.Text(2),
+                 .record = row.Bytes(3),
+                 .last_used_s = row.Integer(4)});
+}
+
+absl::Status CheckSize(const BlobStore& blobs, const BlobClaim& claim) {
+  return CheckBlobSize(blobs, claim.sha256, claim.bytes);
+}
 
 // A row that cannot be used: what its file in the folder `damaged` is called and holds.
 struct BadRow {
@@ -67,15 +110,15 @@ absl::Status SetRowsAside(Database& database, const DataFolder& folder, const ch
 absl::Status CheckSessions(Database& database, const DataFolder& folder,
                            std::vector<DamagedItem>* damaged) {
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> sessions,
-                      BadRows(database, TF_SELECT_SESSIONS, 1, 3, [](const Database::Query& row) {
-                        return ReadSessionAtRest(row).status();
+                      BadRows(database, kSessions, 1, 3, [](const Database::Query& row) {
+                        return SessionAtRestOf(ToSessionRow(row)).status();
                       }));
   TF_RETURN_IF_ERROR(SetRowsAside(database, folder, "session", sessions,
                                   "DELETE FROM sessions WHERE key = ?", damaged));
   // A session whose poses alone are damaged goes on from rest.
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> poses,
-                      BadRows(database, TF_SELECT_SESSIONS, 1, 7, [](const Database::Query& row) {
-                        return ReadSession(row).status();
+                      BadRows(database, kSessions, 1, 7, [](const Database::Query& row) {
+                        return SessionOf(ToSessionRow(row)).status();
                       }));
   for (const BadRow& row : poses) {
     const std::string rest = Seal(SerializePoses({}));
@@ -103,10 +146,11 @@ using Claims = std::map<std::string, absl::Status>;
 absl::Status CheckMeshes(Database& database, const BlobStore& blobs, const DataFolder& folder,
                          Claims* claims, std::vector<DamagedItem>* damaged) {
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> rows,
-                      BadRows(database, TF_SELECT_MESHES, 1, 2, [&](const Database::Query& row) {
-                        const absl::StatusOr<MeshRecord> record = ReadMesh(row);
+                      BadRows(database, kMeshes, 1, 2, [&](const Database::Query& row) {
+                        const absl::StatusOr<MeshRecord> record =
+                            MeshOf(row.Text(1), row.Bytes(2), row.Integer(3));
                         if (record.ok()) {
-                          (*claims)[record->sha256] = CheckMeshBlobSize(blobs, *record);
+                          (*claims)[record->sha256] = CheckSize(blobs, ClaimOf(*record));
                         }
                         return record.status();
                       }));
@@ -115,15 +159,15 @@ absl::Status CheckMeshes(Database& database, const BlobStore& blobs, const DataF
 
 absl::Status CheckPredictions(Database& database, const BlobStore& blobs, const DataFolder& folder,
                               Claims* claims, std::vector<DamagedItem>* damaged) {
-  TF_ASSIGN_OR_RETURN(
-      const std::vector<BadRow> rows,
-      BadRows(database, TF_SELECT_PREDICTIONS, 1, 5, [&](const Database::Query& row) {
-        const absl::StatusOr<PredictionRow> prediction = ReadPrediction(row);
-        if (prediction.ok()) {
-          (*claims)[prediction->positions_sha256] = CheckPositionsSize(blobs, *prediction);
-        }
-        return prediction.status();
-      }));
+  TF_ASSIGN_OR_RETURN(const std::vector<BadRow> rows,
+                      BadRows(database, kPredictions, 1, 5, [&](const Database::Query& row) {
+                        const absl::StatusOr<PredictionRow> prediction = ToPrediction(row);
+                        if (prediction.ok()) {
+                          (*claims)[prediction->positions_sha256] =
+                              CheckSize(blobs, ClaimOf(*prediction));
+                        }
+                        return prediction.status();
+                      }));
   return SetRowsAside(database, folder, "prediction", rows, "DELETE FROM predictions WHERE key = ?",
                       damaged);
 }
@@ -131,11 +175,10 @@ absl::Status CheckPredictions(Database& database, const BlobStore& blobs, const 
 absl::Status CheckCases(Database& database, const BlobStore& blobs, const DataFolder& folder,
                         Claims* claims, std::vector<DamagedItem>* damaged) {
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> rows,
-                      BadRows(database, TF_SELECT_CASES, 1, 3, [&](const Database::Query& row) {
-                        const absl::StatusOr<CaseRecord> record = ReadCaseRow(row);
+                      BadRows(database, kCases, 1, 3, [&](const Database::Query& row) {
+                        const absl::StatusOr<CaseRecord> record = ToCase(row);
                         if (record.ok()) {
-                          (*claims)[record->sha256] =
-                              CheckBlobSize(blobs, record->sha256, record->total_bytes);
+                          (*claims)[record->sha256] = CheckSize(blobs, ClaimOf(*record));
                         }
                         return record.status();
                       }));
@@ -151,15 +194,14 @@ absl::Status SetClaimsAside(Database& database, const DataFolder& folder, const 
     };
   };
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> meshes,
-                      BadRows(database, TF_SELECT_MESHES, 1, 2, claims(1)));
+                      BadRows(database, kMeshes, 1, 2, claims(1)));
   TF_RETURN_IF_ERROR(
       SetRowsAside(database, folder, "mesh", meshes, "DELETE FROM meshes WHERE key = ?", damaged));
-  TF_ASSIGN_OR_RETURN(const std::vector<BadRow> cases,
-                      BadRows(database, TF_SELECT_CASES, 1, 3, claims(1)));
+  TF_ASSIGN_OR_RETURN(const std::vector<BadRow> cases, BadRows(database, kCases, 1, 3, claims(1)));
   TF_RETURN_IF_ERROR(
       SetRowsAside(database, folder, "case", cases, "DELETE FROM cases WHERE key = ?", damaged));
   TF_ASSIGN_OR_RETURN(const std::vector<BadRow> predictions,
-                      BadRows(database, TF_SELECT_PREDICTIONS, 1, 5, claims(4)));
+                      BadRows(database, kPredictions, 1, 5, claims(4)));
   return SetRowsAside(database, folder, "prediction", predictions,
                       "DELETE FROM predictions WHERE key = ?", damaged);
 }

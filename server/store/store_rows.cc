@@ -5,32 +5,10 @@
 
 #include <utility>
 
-#include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
-
 #include "core/base/status_macros.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
-namespace {
-
-// Columns of the selections that have names here.
-enum SessionColumn { kId = 1, kOwner, kRecord, kEtag, kEpoch, kHandles, kPoses, kCreated, kUsed };
-
-SessionRow ToSessionRow(const Database::Query& row) {
-  return {.id = row.Text(kId),
-          .owner = row.Text(kOwner),
-          .record = row.Bytes(kRecord),
-          .etag = row.Text(kEtag),
-          .epoch = row.Integer(kEpoch),
-          .handles = row.Integer(kHandles),
-          .poses = row.Bytes(kPoses),
-          .created_s = row.Integer(kCreated),
-          .last_used_s = row.Integer(kUsed)};
-}
-
-}  // namespace
-
 absl::StatusOr<SessionRecord> SessionAtRestOf(const SessionRow& row) {
   TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(row.record));
   TF_ASSIGN_OR_RETURN(SessionRecord record, ParseRecord(bytes));
@@ -88,60 +66,42 @@ absl::StatusOr<CaseRecord> CaseOf(const CaseRow& row) {
   return record;
 }
 
-absl::StatusOr<SessionRecord> ReadSessionAtRest(const Database::Query& row) {
-  return SessionAtRestOf(ToSessionRow(row));
+absl::StatusOr<SessionRecord> ReadSession(const SqlRows& rows, size_t row) {
+  return SessionOf({.id = rows.Text(row, 0),
+                    .owner = rows.Text(row, 1),
+                    .record = rows.Text(row, 2),
+                    .etag = rows.Text(row, 3),
+                    .epoch = rows.Integer(row, 4),
+                    .handles = rows.Integer(row, 5),
+                    .poses = rows.Text(row, 6),
+                    .created_s = rows.Integer(row, 7),
+                    .last_used_s = rows.Integer(row, 8)});
 }
 
-absl::StatusOr<SessionRecord> ReadSession(const Database::Query& row) {
-  return SessionOf(ToSessionRow(row));
+absl::StatusOr<MeshRecord> ReadMesh(const SqlRows& rows, size_t row) {
+  return MeshOf(rows.Text(row, 0), rows.Text(row, 1), rows.Integer(row, 2));
 }
 
-absl::StatusOr<MeshRecord> ReadMesh(const Database::Query& row) {
-  return MeshOf(row.Text(1), row.Bytes(2), row.Integer(3));
+absl::StatusOr<PredictionRow> ReadPrediction(const SqlRows& rows, size_t row) {
+  return PredictionOf({.id = rows.Text(row, 0),
+                       .owner = rows.Text(row, 1),
+                       .session = rows.Text(row, 2),
+                       .positions_sha256 = rows.Text(row, 3),
+                       .record = rows.Text(row, 4),
+                       .case_sha256 = rows.Text(row, 5)});
 }
 
-absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row) {
-  return PredictionOf({.id = row.Text(1),
-                       .owner = row.Text(2),
-                       .session = row.Text(3),
-                       .positions_sha256 = row.Text(4),
-                       .record = row.Bytes(5),
-                       .case_sha256 = row.Text(6)});
+absl::StatusOr<CaseRecord> ReadCase(const SqlRows& rows, size_t row) {
+  return CaseOf({.sha256 = rows.Text(row, 0),
+                 .owner = rows.Text(row, 1),
+                 .record = rows.Text(row, 2),
+                 .last_used_s = rows.Integer(row, 3)});
 }
 
-absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row) {
-  return CaseOf({.sha256 = row.Text(1),
-                 .owner = row.Text(2),
-                 .record = row.Bytes(3),
-                 .last_used_s = row.Integer(4)});
-}
-
-std::string NamesInJson(const std::set<std::string>& names) {
-  if (names.empty()) return "[]";
-  return absl::StrCat("[\"", absl::StrJoin(names, "\",\""), "\"]");
-}
-
-absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256) {
-  Database::Query query = database.Prepare(
-      "SELECT EXISTS (SELECT 1 FROM meshes WHERE sha256 = ?1) OR "
-      "EXISTS (SELECT 1 FROM cases WHERE sha256 = ?1) OR "
-      "EXISTS (SELECT 1 FROM predictions WHERE positions_sha256 = ?1)");
-  TF_RETURN_IF_ERROR(query.Bind(sha256).Step().status());
-  return query.Integer(0) != 0;
-}
-
-absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256) {
-  TF_ASSIGN_OR_RETURN(const bool claimed, IsClaimed(database, sha256));
-  return claimed ? absl::OkStatus() : blobs.Remove(sha256);
-}
-
-absl::Status DeleteClaims(Database& database, const std::string& sha256) {
-  for (const char* statement :
-       {"DELETE FROM meshes WHERE sha256 = ?", "DELETE FROM cases WHERE sha256 = ?",
-        "DELETE FROM predictions WHERE positions_sha256 = ?"}) {
-    TF_RETURN_IF_ERROR(database.Prepare(statement).Bind(sha256).Run());
-  }
-  return absl::OkStatus();
+SealedSession::SealedSession(SessionRecord session)
+    : poses(Seal(SerializePoses(session.last_poses))) {
+  session.last_poses.clear();
+  record = Seal(SerializeRecord(session));
 }
 
 }  // namespace tissueform

@@ -3,32 +3,30 @@
 
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <set>
 #include <string>
 
-#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-#include "server/platform/storage/database.h"
-#include "server/store/blob_store.h"
 #include "server/store/session_record.h"
+#include "server/store/sql_database.h"
 #include "server/store/store_records.h"
 
-// How rows become records; what the stores of a database and its check at the start share. A
+// How rows become records, and records rows; what the stores and the check at the start share. A
 // statement begins with one of these selections. Errors of reading: DataLoss.
 namespace tissueform {
 
-#define TF_SELECT_SESSIONS                                                           \
-  "SELECT sessions.key, id, owner, record, etag, epoch, handles, poses, created_s, " \
-  "last_used_s FROM sessions LEFT JOIN session_states ON session_states.key = sessions.key "
-#define TF_SELECT_MESHES "SELECT key, sha256, record, last_used_s FROM meshes "
+#define TF_SELECT_SESSIONS                                                                       \
+  "SELECT id, owner, record, etag, epoch, handles, poses, created_s, last_used_s FROM sessions " \
+  "JOIN session_states ON session_states.key = sessions.key "
+#define TF_SELECT_MESHES "SELECT sha256, record, last_used_s FROM meshes "
 #define TF_SELECT_PREDICTIONS \
-  "SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions "
-#define TF_SELECT_CASES "SELECT key, sha256, owner, record, last_used_s FROM cases "
+  "SELECT id, owner, session, positions_sha256, record, case_sha256 FROM predictions "
+#define TF_SELECT_CASES "SELECT sha256, owner, record, last_used_s FROM cases "
 
-// What stands in a row, of whatever database: views that live as long as it. Bytes are sealed, and
+// What stands in a row: views that live as long as it. Bytes are sealed, and
 // must agree with the columns beside them.
 struct SessionRow {
   absl::string_view id = {};
@@ -55,6 +53,7 @@ struct CaseRow {
   absl::string_view record = {};
   int64_t last_used_s = 0;
 };
+// At rest: without its poses, which may be damaged alone.
 absl::StatusOr<SessionRecord> SessionAtRestOf(const SessionRow& row);
 absl::StatusOr<SessionRecord> SessionOf(const SessionRow& row);
 absl::StatusOr<MeshRecord> MeshOf(absl::string_view sha256, absl::string_view record,
@@ -62,20 +61,18 @@ absl::StatusOr<MeshRecord> MeshOf(absl::string_view sha256, absl::string_view re
 absl::StatusOr<PredictionRow> PredictionOf(const PredictionColumns& row);
 absl::StatusOr<CaseRecord> CaseOf(const CaseRow& row);
 
-// At rest: without its poses, which may be damaged alone.
-absl::StatusOr<SessionRecord> ReadSessionAtRest(const Database::Query& row);
-absl::StatusOr<SessionRecord> ReadSession(const Database::Query& row);
-absl::StatusOr<MeshRecord> ReadMesh(const Database::Query& row);
-absl::StatusOr<PredictionRow> ReadPrediction(const Database::Query& row);
-absl::StatusOr<CaseRecord> ReadCaseRow(const Database::Query& row);
+// Rows of the selections.
+absl::StatusOr<SessionRecord> ReadSession(const SqlRows& rows, size_t row);
+absl::StatusOr<MeshRecord> ReadMesh(const SqlRows& rows, size_t row);
+absl::StatusOr<PredictionRow> ReadPrediction(const SqlRows& rows, size_t row);
+absl::StatusOr<CaseRecord> ReadCase(const SqlRows& rows, size_t row);
 
-// A list of names for json_each. REQUIRES: they are letters, digits and "-".
-std::string NamesInJson(const std::set<std::string>& names);
+// A session's bytes as its two rows hold them. Poses have a row of their own.
+struct SealedSession {
+  explicit SealedSession(SessionRecord session);
 
-// Removes the blob when no row claims it.
-absl::Status RemoveUnclaimed(Database& database, BlobStore& blobs, const std::string& sha256);
-absl::StatusOr<bool> IsClaimed(Database& database, const std::string& sha256);
-// Deletes all rows that claim it.
-absl::Status DeleteClaims(Database& database, const std::string& sha256);
+  std::string record;
+  std::string poses;
+};
 
 }  // namespace tissueform

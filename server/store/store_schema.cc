@@ -4,13 +4,18 @@
 #include "server/store/store_schema.h"
 
 #include <array>
+#include <cstddef>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
 #include "server/platform/storage/fault_points.h"
+#include "server/store/session_record.h"
+#include "server/store/store_records.h"
 
 namespace tissueform {
 namespace {
@@ -58,10 +63,40 @@ constexpr char kVersion5[] =
     "CREATE TABLE exports (key INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, "
     "record BLOB NOT NULL) STRICT;";
 
+constexpr char kVersion6[] =
+    "ALTER TABLE sessions ADD COLUMN mesh TEXT;"
+    "CREATE INDEX sessions_by_mesh ON sessions(mesh);"
+    "ALTER TABLE exports ADD COLUMN version INTEGER NOT NULL DEFAULT 0;";
+
 absl::StatusOr<int64_t> Pragma(Database& database, const char* sql) {
   Database::Query query = database.Prepare(sql);
   TF_ASSIGN_OR_RETURN(const bool row, query.Step());
   return row ? query.Integer(0) : 0;
+}
+
+// What sessions of version 5 are made from. Damaged ones are set aside later (store_check.h).
+absl::Status FillMeshesOfSessions(Database& database) {
+  std::vector<std::pair<int64_t, std::string>> meshes;
+  {
+    Database::Query query = database.Prepare("SELECT key, record FROM sessions");
+    for (;;) {
+      TF_ASSIGN_OR_RETURN(const bool found, query.Step());
+      if (!found) break;
+      const absl::StatusOr<absl::string_view> bytes = Unseal(query.Bytes(1));
+      if (!bytes.ok()) continue;
+      const absl::StatusOr<SessionRecord> record = ParseRecord(*bytes);
+      if (record.ok()) meshes.emplace_back(query.Integer(0), record->mesh_sha256);
+    }
+  }
+  for (const auto& [key, mesh] : meshes) {
+    TF_RETURN_IF_ERROR(database
+                           .Prepare("UPDATE sessions SET mesh = (SELECT sha256 FROM meshes WHERE "
+                                    "sha256 = ?) WHERE key = ?")
+                           .Bind(mesh)
+                           .Bind(key)
+                           .Run());
+  }
+  return absl::OkStatus();
 }
 
 absl::Status Change(Database& database, int64_t version, int64_t now_s) {
@@ -75,68 +110,46 @@ absl::Status Change(Database& database, int64_t version, int64_t now_s) {
   if (version < 3) TF_RETURN_IF_ERROR(database.Execute(kVersion3));
   if (version < 4) TF_RETURN_IF_ERROR(database.Execute(kVersion4));
   if (version < 5) TF_RETURN_IF_ERROR(database.Execute(kVersion5));
+  if (version < 6) {
+    TF_RETURN_IF_ERROR(database.Execute(kVersion6));
+    TF_RETURN_IF_ERROR(FillMeshesOfSessions(database));
+  }
   TF_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA application_id=", kApplicationId,
                                                    ";PRAGMA user_version=", kSchemaVersion)));
   TF_FAULT_POINT("schema.changed");
   return database.Execute("COMMIT");
 }
 
-struct Table {
-  const char* rising;   // all columns, key first
-  const char* falling;  // the same from the other end
-  const char* insert;
-  int columns;
-};
+// With the key.
+int CountColumns(const StoredTable& table) {
+  return static_cast<int>(absl::string_view(table.types).size()) + 1;
+}
 
-constexpr std::array<Table, 9> kTables = {{
-    {"SELECT key, id, owner, record FROM sessions ORDER BY key",
-     "SELECT key, id, owner, record FROM sessions ORDER BY key DESC",
-     "INSERT OR IGNORE INTO sessions (key, id, owner, record) VALUES (?, ?, ?, ?)", 4},
-    {"SELECT key, etag, epoch, handles, poses, created_s, last_used_s FROM session_states ORDER BY "
-     "key",
-     "SELECT key, etag, epoch, handles, poses, created_s, last_used_s FROM session_states ORDER BY "
-     "key DESC",
-     "INSERT OR IGNORE INTO session_states (key, etag, epoch, handles, poses, created_s, "
-     "last_used_s) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7 WHERE EXISTS (SELECT 1 FROM sessions WHERE "
-     "key = ?1)",
-     7},
-    {"SELECT key, sha256, record, last_used_s FROM meshes ORDER BY key",
-     "SELECT key, sha256, record, last_used_s FROM meshes ORDER BY key DESC",
-     "INSERT OR IGNORE INTO meshes (key, sha256, record, last_used_s) VALUES (?, ?, ?, ?)", 4},
-    {"SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions ORDER "
-     "BY key",
-     "SELECT key, id, owner, session, positions_sha256, record, case_sha256 FROM predictions ORDER "
-     "BY key DESC",
-     "INSERT OR IGNORE INTO predictions (key, id, owner, session, positions_sha256, record, "
-     "case_sha256) VALUES (?, ?, ?, ?, ?, ?, ?)",
-     7},
-    {"SELECT key, sha256, owner, record, last_used_s FROM cases ORDER BY key",
-     "SELECT key, sha256, owner, record, last_used_s FROM cases ORDER BY key DESC",
-     "INSERT OR IGNORE INTO cases (key, sha256, owner, record, last_used_s) VALUES (?, ?, ?, ?, ?)",
-     5},
-    {"SELECT key, name, record FROM shares ORDER BY key",
-     "SELECT key, name, record FROM shares ORDER BY key DESC",
-     "INSERT OR IGNORE INTO shares (key, name, record) VALUES (?, ?, ?)", 3},
-    {"SELECT key, name, record FROM follow_links ORDER BY key",
-     "SELECT key, name, record FROM follow_links ORDER BY key DESC",
-     "INSERT OR IGNORE INTO follow_links (key, name, record) VALUES (?, ?, ?)", 3},
-    {"SELECT key, name, record FROM mesh_rights ORDER BY key",
-     "SELECT key, name, record FROM mesh_rights ORDER BY key DESC",
-     "INSERT OR IGNORE INTO mesh_rights (key, name, record) VALUES (?, ?, ?)", 3},
-    {"SELECT key, name, record FROM exports ORDER BY key",
-     "SELECT key, name, record FROM exports ORDER BY key DESC",
-     "INSERT OR IGNORE INTO exports (key, name, record) VALUES (?, ?, ?)", 3},
-}};
+std::string SelectAll(const StoredTable& table, absl::string_view order) {
+  return absl::StrCat("SELECT key, ", table.columns, " FROM ", table.name, " ORDER BY key", order);
+}
+
+std::string InsertRow(const StoredTable& table) {
+  std::string parameters = "?1";
+  for (int column = 2; column <= CountColumns(table); ++column) {
+    absl::StrAppend(&parameters, ", ?", column);
+  }
+  return absl::StrCat("INSERT OR IGNORE INTO ", table.name, " (key, ", table.columns, ") SELECT ",
+                      parameters,
+                      table.name == absl::string_view("session_states")
+                          ? " WHERE EXISTS (SELECT 1 FROM sessions WHERE key = ?1)"
+                          : "");
+}
 
 // True at the end of the table, false at a page that cannot be read.
-absl::StatusOr<bool> CopyRows(Database& damaged, Database& fresh, const Table& table,
-                              const char* select) {
-  Database::Query rows = damaged.Prepare(select);
+absl::StatusOr<bool> CopyRows(Database& damaged, Database& fresh, const StoredTable& table,
+                              const std::string& select, const std::string& insert_row) {
+  Database::Query rows = damaged.Prepare(select.c_str());
   for (;;) {
     const absl::StatusOr<bool> row = rows.Step();
     if (!row.ok() || !*row) return row.ok();
-    Database::Query insert = fresh.Prepare(table.insert);
-    for (int column = 0; column < table.columns; ++column) rows.CopyColumn(column, &insert);
+    Database::Query insert = fresh.Prepare(insert_row.c_str());
+    for (int column = 0; column < CountColumns(table); ++column) rows.CopyColumn(column, &insert);
     // A row may be readable and yet not fit into the tables; only a full disk ends the copy.
     if (const absl::Status status = insert.Run(); absl::IsResourceExhausted(status)) return status;
   }
@@ -183,9 +196,17 @@ absl::Status CopyReadableRows(Database& damaged, Database& fresh) {
   absl::Cleanup roll_back = [&fresh] {
     if (fresh.in_transaction()) fresh.Execute("ROLLBACK").IgnoreError();
   };
-  for (const Table& table : kTables) {
-    TF_ASSIGN_OR_RETURN(const bool whole, CopyRows(damaged, fresh, table, table.rising));
-    if (!whole) TF_RETURN_IF_ERROR(CopyRows(damaged, fresh, table, table.falling).status());
+  // A statement is known by its address: they live as long as the databases' use of them.
+  std::vector<std::array<std::string, 3>> statements;
+  for (const StoredTable& table : kStoredTables) {
+    statements.push_back({SelectAll(table, ""), SelectAll(table, " DESC"), InsertRow(table)});
+  }
+  for (size_t i = 0; i < kStoredTables.size(); ++i) {
+    const auto& [rising, falling, insert] = statements[i];
+    TF_ASSIGN_OR_RETURN(const bool whole,
+                        CopyRows(damaged, fresh, kStoredTables[i], rising, insert));
+    if (whole) continue;
+    TF_RETURN_IF_ERROR(CopyRows(damaged, fresh, kStoredTables[i], falling, insert).status());
   }
   return fresh.Execute("COMMIT");
 }

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "absl/status/status.h"
@@ -15,7 +16,9 @@ namespace tissueform {
 // The tables of a store. A record is its sealed bytes (store_records.h); beside it stand only what
 // rows are found by and what changes often.
 //
-//   sessions        id, owner, record without its poses
+//   sessions        id, owner, record without its poses, mesh: that it is made from, which cannot
+//   be
+//                   deleted meanwhile; null where it is not there
 //   session_states  what a session's writes change: etag, epoch, poses, times. A row of its own, so
 //                   that the commit of a pose writes one small page and not the record.
 //   meshes          sha256, record, last_used_s; the payload is the blob sha256
@@ -24,11 +27,31 @@ namespace tissueform {
 //   cases           sha256, owner, record, last_used_s; the file is the blob sha256
 //   shares, follow_links, mesh_rights
 //                   name, record: who may do what (server/store/access_store)
-//   exports         name, record: what is to go to the PACS (server/exports)
+//   exports         name, record, version: what is to go to the PACS (server/exports); version 0 is
+//                   that of a server that did not keep it
 //
 // Version 1 had neither times nor predictions, version 2 no cases, version 3 one owner a case, and
-// nobody had a right; version 4 had no exports.
-inline constexpr int64_t kSchemaVersion = 5;
+// nobody had a right; version 4 had no exports, version 5 no meshes of sessions.
+inline constexpr int64_t kSchemaVersion = 6;
+
+// A table, for who copies rows as they are.
+struct StoredTable {
+  const char* name;
+  const char* columns;  // all but `key`, by which rows are told apart
+  const char* types;    // of each column: "i" integer, "t" text, "b" bytes
+};
+// In the order in which rows need each other.
+inline constexpr std::array<StoredTable, 9> kStoredTables = {{
+    {"meshes", "sha256, record, last_used_s", "tbi"},
+    {"sessions", "id, owner, record, mesh", "ttbt"},
+    {"session_states", "etag, epoch, handles, poses, created_s, last_used_s", "tiibii"},
+    {"predictions", "id, owner, session, positions_sha256, record, case_sha256", "ttttbt"},
+    {"cases", "sha256, owner, record, last_used_s", "ttbi"},
+    {"shares", "name, record", "tb"},
+    {"follow_links", "name, record", "tb"},
+    {"mesh_rights", "name, record", "tb"},
+    {"exports", "name, record, version", "tbi"},
+}};
 
 // The version of a database of ours; 0 for an empty one. Nothing is changed.
 //

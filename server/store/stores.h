@@ -13,13 +13,12 @@
 #include "server/store/mesh_store.h"
 #include "server/store/prediction_store.h"
 #include "server/store/session_store.h"
+#include "server/store/sql_database.h"
 #include "server/store/upload_store.h"
 
 namespace tissueform {
 
-class CommitThread;
-
-// All that a server keeps: OpenInMemoryStores (in_memory_stores.h) or DurableStore::Open.
+// All that a server keeps: sql_stores.h.
 //
 // Its end waits for the calls that were made; none may be made any longer.
 class Stores {
@@ -36,8 +35,8 @@ class Stores {
   virtual const DurationHistogram* latency() const { return nullptr; }
   // Where it is kept; empty: in memory.
   virtual std::string folder() const { return {}; }
-  // Of the database in which other rooms keep rows of theirs, too; null where there is none.
-  virtual CommitThread* commit_thread() { return nullptr; }
+  // In which other rooms keep rows of theirs, too.
+  virtual SqlDatabase& database() = 0;
   // What is acknowledged outlives the process; so must the rows of other rooms.
   virtual bool keeps() const = 0;
 

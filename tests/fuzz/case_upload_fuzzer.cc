@@ -10,11 +10,11 @@
 
 #include "core/mesh/payload/sha256.h"
 #include "server/rpc/case_service.h"
-#include "server/store/in_memory_case_store.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/rpc_rig.h"
 #include "tests/testing/fake_calls.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/no_logins.h"
 
 namespace tissueform::fuzz {
@@ -33,7 +33,7 @@ struct CaseRig {
 
   ServiceLimits limits{.max_case_bytes = 64 << 10, .max_cases = 3};
   AdmissionControl gate;
-  InMemoryCaseStore store{128 << 10};
+  InMemoryCaseStore store;
   WorkerPool workers{2};
   DeadlineTimer timer;
   testing::NoLogins no_logins;

@@ -14,9 +14,9 @@
 #include "server/rpc/deform_service.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/session_registry.h"
-#include "server/store/in_memory_session_store.h"
 #include "tests/testing/fake_calls.h"
 #include "tests/testing/fake_clock.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/no_logins.h"
 #include "tissueform/v1/deform_service.pb.h"
 

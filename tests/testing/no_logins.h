@@ -4,7 +4,7 @@
 #pragma once
 
 #include "server/access/access_changes.h"
-#include "server/store/access_store/in_memory_access_store.h"
+#include "tests/testing/in_memory_stores.h"
 
 namespace tissueform::testing {
 

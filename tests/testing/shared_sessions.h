@@ -15,8 +15,8 @@
 #include "core/base/error_reason.h"
 #include "core/base/mutex.h"
 #include "server/session/session_ownership.h"
-#include "server/store/in_memory_session_store.h"
 #include "server/store/store_errors.h"
+#include "tests/testing/in_memory_stores.h"
 
 // Servers that share a store, in one process: who holds a session by leases on a clock that a test
 // turns, and a store that refuses writes under old epochs.

@@ -33,6 +33,7 @@ constexpr char kSettings[] =
     "PRAGMA foreign_keys=ON;"
     "PRAGMA trusted_schema=OFF;"
     "PRAGMA cell_size_check=ON;";
+constexpr char kInMemory[] = ":memory:";
 constexpr char kSettingsForReading[] =
     "PRAGMA trusted_schema=OFF;"
     "PRAGMA cell_size_check=ON;";
@@ -141,6 +142,8 @@ absl::string_view Database::Query::Bytes(int column) const {
              : absl::string_view(static_cast<const char*>(bytes), static_cast<size_t>(size));
 }
 
+int Database::Query::num_columns() const { return sqlite3_column_count(statement_); }
+
 void Database::Query::CopyColumn(int column, Query* other) const {
   if (other->error_ == SQLITE_OK) {
     other->error_ = sqlite3_bind_value(other->statement_, ++other->bound_,
@@ -158,6 +161,10 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path
 absl::StatusOr<std::unique_ptr<Database>> Database::OpenForReading(const std::string& path) {
   TF_RETURN_IF_ERROR(OpenFile::Open(path, O_RDONLY).status());
   return Open(path, SQLITE_OPEN_READONLY, kSettingsForReading);
+}
+
+absl::StatusOr<std::unique_ptr<Database>> Database::OpenInMemory() {
+  return Open(kInMemory, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, kSettings);
 }
 
 absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path, int flags,
@@ -178,10 +185,12 @@ Database::~Database() {
   sqlite3_close_v2(handle_);
 }
 
-Database::Query Database::Prepare(const char* sql) {
+Database::Query Database::Prepare(const char* sql,
+                                  std::string (*translate)(absl::string_view sql)) {
   sqlite3_stmt*& statement = statements_[sql];
   if (statement == nullptr) {
-    sqlite3_prepare_v3(handle_, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+    const std::string text = translate == nullptr ? sql : translate(sql);
+    sqlite3_prepare_v3(handle_, text.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
   }
   Query query(this, statement);
   if (statement == nullptr) query.error_ = SQLITE_ERROR;
@@ -199,6 +208,7 @@ bool Database::in_transaction() const { return sqlite3_get_autocommit(handle_) =
 int64_t Database::total_changes() const { return sqlite3_total_changes64(handle_); }
 
 absl::StatusOr<bool> Database::TruncateLog() {
+  if (path_ == kInMemory) return true;
   sqlite3_busy_timeout(handle_, kTruncateBusyMs);
   const int result =
       sqlite3_wal_checkpoint_v2(handle_, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);

@@ -43,6 +43,7 @@ class Database {
     // All steps, for a statement without rows.
     absl::Status Run();
 
+    int num_columns() const;
     // Columns of the row, from 0.
     int64_t Integer(int column) const;
     absl::string_view Text(int column) const;
@@ -65,6 +66,8 @@ class Database {
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::string& path);
   // For reading a file that nobody writes; no other file is made beside it. Errors: NotFound.
   static absl::StatusOr<std::unique_ptr<Database>> OpenForReading(const std::string& path);
+  // One that goes with this object. TruncateLog does nothing: there is no log.
+  static absl::StatusOr<std::unique_ptr<Database>> OpenInMemory();
   ~Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
@@ -72,7 +75,9 @@ class Database {
   const std::string& path() const { return path_; }
 
   // Prepared once: `sql` is a literal, known by its address. REQUIRES: no Query of it is in use.
-  Query Prepare(const char* sql);
+  Query Prepare(const char* sql) { return Prepare(sql, nullptr); }
+  // The same in other words, which `translate` finds when it is prepared; null: it stays as it is.
+  Query Prepare(const char* sql, std::string (*translate)(absl::string_view sql));
   // A statement without values and rows, or several.
   absl::Status Execute(const std::string& sql);
 

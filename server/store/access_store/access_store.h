@@ -5,14 +5,11 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-
-#include "server/store/stores.h"
 
 namespace tissueform {
 
@@ -71,9 +68,5 @@ class AccessStore {
   // nothing. `done` when that is as durable as the store is: once, on any thread; it may not block.
   virtual void Change(AccessRows erase, AccessRows put, std::function<void(absl::Status)> done) = 0;
 };
-
-// Beside the other rows of `stores`, which must outlive it; in memory where those are. REQUIRES:
-// stores that keep have a commit thread (those of PostgreSQL have a PostgresAccessStore).
-std::unique_ptr<AccessStore> OpenAccessStore(Stores* stores);
 
 }  // namespace tissueform

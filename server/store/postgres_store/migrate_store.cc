@@ -3,36 +3,32 @@
 
 #include "server/store/postgres_store/migrate_store.h"
 
-#include <algorithm>
-#include <future>
-#include <limits>
+#include <map>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "server/exports/export_store.h"
-#include "server/store/access_store/access_store.h"
-#include "server/store/postgres_store/postgres_access_store.h"
-#include "server/store/postgres_store/postgres_blobs.h"
-#include "server/store/postgres_store/postgres_export_store.h"
 #include "server/store/postgres_store/postgres_schema.h"
-#include "server/store/postgres_store/postgres_session_rows.h"
+#include "server/store/sql_case_store.h"
+#include "server/store/sql_mesh_store.h"
+#include "server/store/sql_prediction_store.h"
+#include "server/store/store_rows.h"
+#include "server/store/store_schema.h"
 
 namespace tissueform {
 namespace {
 
-constexpr int kMigrationPage = 100;
+constexpr int64_t kMigrationPage = 100;
 
 absl::Status CheckEmpty(PostgresPool* pool) {
   return pool->Run([&](PostgresTransaction& transaction) -> absl::Status {
     for (const char* table :
          {"sessions", "blobs", "shares", "follow_links", "mesh_rights", "exports"}) {
       const std::string sql = absl::StrCat("SELECT 1 FROM ", table, " LIMIT 1");
-      TF_ASSIGN_OR_RETURN(const PostgresRows rows, transaction.Query(sql.c_str(), {}));
+      TF_ASSIGN_OR_RETURN(const SqlRows rows, transaction.Query(sql.c_str(), {}));
       if (rows.empty()) continue;
       return absl::FailedPreconditionError(absl::StrCat("database ", pool->target().name,
                                                         " is not empty (there are ", table,
@@ -42,125 +38,157 @@ absl::Status CheckEmpty(PostgresPool* pool) {
   });
 }
 
-template <typename Result, typename Call>
-Result AnswerOf(Call call) {
-  std::promise<Result> answer;
-  call([&answer](Result result) { answer.set_value(std::move(result)); });
-  return answer.get_future().get();
+absl::Status CopyBlob(SqlStores* from, const BlobClaim& claim, SqlStores* to) {
+  std::unique_ptr<SqlBlobs::Incoming> copy;
+  const auto begin = [&](SqlTransaction&) -> absl::StatusOr<BlobClaim> {
+    TF_ASSIGN_OR_RETURN(copy, to->blobs().Receive());
+    return claim;
+  };
+  TF_RETURN_IF_ERROR(
+      from->blobs().Read(begin, [&copy](absl::string_view piece) { return copy->Append(piece); }));
+  // The rows that claim it follow with their tables.
+  return copy->Keep(claim.sha256, [](SqlTransaction&) { return absl::OkStatus(); });
 }
 
-absl::Status InsertAll(const std::vector<SessionRecord>& records, PostgresPool* to) {
-  return to->Run([&](PostgresTransaction& transaction) -> absl::Status {
-    for (const SessionRecord& record : records) {
-      TF_RETURN_IF_ERROR(InsertSession(transaction, record).status());
+// Blobs that rows of this selection claim. `select` names rows greater than $1 in order, $2 of
+// them; `name_column` is that by which they follow each other.
+template <typename Read>
+absl::Status CopyBlobs(SqlStores* from, SqlStores* to, const char* select, size_t name_column,
+                       Read read) {
+  std::string after;
+  for (;;) {
+    TF_ASSIGN_OR_RETURN(const SqlRows rows,
+                        ReadSql<SqlRows>(&from->database(), [&](SqlTransaction& transaction) {
+                          return transaction.Query(select, {after, kMigrationPage});
+                        }));
+    if (rows.empty()) return absl::OkStatus();
+    for (size_t row = 0; row < rows.size(); ++row) {
+      TF_ASSIGN_OR_RETURN(const auto record, read(rows, row));
+      TF_RETURN_IF_ERROR(CopyBlob(from, ClaimOf(record), to));
+    }
+    after = std::string(rows.Text(rows.size() - 1, name_column));
+  }
+}
+
+absl::Status CopyAllBlobs(SqlStores* from, SqlStores* to) {
+  TF_RETURN_IF_ERROR(CopyBlobs(
+      from, to, TF_SELECT_MESHES "WHERE sha256 > $1 ORDER BY sha256 LIMIT $2", 0, ReadMesh));
+  TF_RETURN_IF_ERROR(CopyBlobs(from, to, TF_SELECT_PREDICTIONS "WHERE id > $1 ORDER BY id LIMIT $2",
+                               0, ReadPrediction));
+  // Those of one name, which a page may part, have one blob.
+  return CopyBlobs(from, to, TF_SELECT_CASES "WHERE sha256 > $1 ORDER BY sha256 LIMIT $2", 0,
+                   ReadCase);
+}
+
+// How a table is read page by page, and written.
+struct CopyStatements {
+  explicit CopyStatements(const StoredTable& table)
+      : select(absl::StrCat("SELECT key, ", table.columns, " FROM ", table.name,
+                            " WHERE key > $1 ORDER BY key LIMIT $2")),
+        insert(absl::StrCat("INSERT INTO ", table.name, " (key, ", table.columns,
+                            ") OVERRIDING SYSTEM VALUE VALUES ($1")) {
+    const bool of_sessions = table.name == absl::string_view("sessions");
+    const auto columns = absl::string_view(table.types).size();
+    for (size_t column = 0; column < columns; ++column) {
+      const std::string parameter = absl::StrCat("$", column + 2);
+      // The mesh of a session need not be there any longer.
+      absl::StrAppend(
+          &insert, ", ",
+          of_sessions && column + 1 == columns
+              ? absl::StrCat("(SELECT sha256 FROM meshes WHERE sha256 = ", parameter, ")")
+              : parameter);
+    }
+    insert += ")";
+  }
+
+  std::string select;
+  std::string insert;
+};
+
+// They live for good: SQLite's driver knows them by their addresses.
+const CopyStatements& StatementsOf(const StoredTable& table) {
+  static const auto* const all = [] {
+    auto* statements = new std::map<absl::string_view, CopyStatements>;
+    for (const StoredTable& each : kStoredTables) {
+      statements->emplace(each.name, CopyStatements(each));
+    }
+    return statements;
+  }();
+  return all->at(table.name);
+}
+
+std::vector<SqlValue> ValuesOf(const SqlRows& rows, size_t row, absl::string_view types) {
+  std::vector<SqlValue> values = {rows.Integer(row, 0)};
+  for (size_t column = 1; column <= types.size(); ++column) {
+    switch (types[column - 1]) {
+      case 'i':
+        values.emplace_back(rows.Integer(row, column));
+        break;
+      case 'b':
+        values.emplace_back(SqlBytes{rows.Text(row, column)});
+        break;
+      default:
+        values.emplace_back(rows.Text(row, column));
+    }
+  }
+  return values;
+}
+
+// Returns how many rows there are.
+absl::StatusOr<int64_t> CopyTable(SqlStores* from, const StoredTable& table, PostgresPool* to) {
+  const CopyStatements& statements = StatementsOf(table);
+  int64_t count = 0;
+  int64_t after = 0;
+  for (;;) {
+    TF_ASSIGN_OR_RETURN(
+        const SqlRows rows, ReadSql<SqlRows>(&from->database(), [&](SqlTransaction& transaction) {
+          return transaction.Query(statements.select.c_str(), {after, kMigrationPage});
+        }));
+    if (rows.empty()) return count;
+    const auto insert = [&](PostgresTransaction& transaction) -> absl::Status {
+      for (size_t row = 0; row < rows.size(); ++row) {
+        TF_RETURN_IF_ERROR(
+            transaction.Run(statements.insert.c_str(), ValuesOf(rows, row, table.types)));
+      }
+      return absl::OkStatus();
+    };
+    TF_RETURN_IF_ERROR(to->Run(insert));
+    count += static_cast<int64_t>(rows.size());
+    after = rows.Integer(rows.size() - 1, 0);
+  }
+}
+
+// The next key and the next epoch are greater than all that were copied.
+absl::Status GoOnCounting(PostgresPool* pool) {
+  return pool->Run([](PostgresTransaction& transaction) -> absl::Status {
+    for (const StoredTable& table : kStoredTables) {
+      // Its key is that of its session.
+      if (table.name == absl::string_view("session_states")) continue;
+      TF_RETURN_IF_ERROR(transaction.Execute(absl::StrCat("SELECT setval(pg_get_serial_sequence('",
+                                                          table.name, "', 'key'), max(key)) FROM ",
+                                                          table.name, " HAVING max(key) > 0")));
     }
     return RaiseSessionEpochs(transaction);
   });
 }
 
-absl::StatusOr<int64_t> MigrateSessions(SessionStore& from, PostgresPool* to) {
-  int64_t count = 0;
-  SessionStore::ListRequest request{.limit = kMigrationPage};
-  do {
-    TF_ASSIGN_OR_RETURN(const SessionStore::Page page, AnswerOf<absl::StatusOr<SessionStore::Page>>(
-                                                           [&](SessionStore::PageCallback done) {
-                                                             from.List(request, std::move(done));
-                                                           }));
-    TF_RETURN_IF_ERROR(InsertAll(page.records, to));
-    count += static_cast<int64_t>(page.records.size());
-    request.after = page.next;
-  } while (!request.after.empty());
-  return count;
-}
-
-absl::StatusOr<int64_t> MigrateMeshes(MeshStore& from, MeshStore& to) {
-  int64_t count = 0;
-  std::string after;
-  do {
-    TF_ASSIGN_OR_RETURN(const MeshStore::Page page, from.List(after, kMigrationPage));
-    for (const MeshRecord& record : page.records) {
-      TF_ASSIGN_OR_RETURN(const MeshPayload payload, from.Read(record.sha256));
-      TF_RETURN_IF_ERROR(to.Put(record, payload.View()));
-    }
-    count += static_cast<int64_t>(page.records.size());
-    after = page.next;
-  } while (!after.empty());
-  return count;
-}
-
-absl::StatusOr<int64_t> MigratePredictions(PredictionStore& from, PredictionStore& to) {
-  int64_t count = 0;
-  PredictionStore::ListRequest request{.limit = kMigrationPage};
-  do {
-    TF_ASSIGN_OR_RETURN(const PredictionStore::Page page, from.List(request));
-    for (const PredictionRecord& record : page.records) {
-      TF_ASSIGN_OR_RETURN(const std::string positions, from.Positions(record.id));
-      TF_RETURN_IF_ERROR(to.Create(record, positions));
-    }
-    count += static_cast<int64_t>(page.records.size());
-    request.after = page.next;
-  } while (!request.after.empty());
-  return count;
-}
-
-absl::Status MigrateCase(CaseStore& from, const CaseRecord& record, CaseStore& to) {
-  // Opening is a use, as any other; the record that is carried over is that of before.
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<CaseReader> reader,
-                      from.Open(record.key(), record.last_used_s));
-  TF_ASSIGN_OR_RETURN(const std::unique_ptr<CaseWriter> writer,
-                      to.Begin(record, std::numeric_limits<int>::max()));
-  for (int64_t offset = 0; offset < record.total_bytes; offset += kBlobPieceBytes) {
-    TF_ASSIGN_OR_RETURN(
-        const std::string bytes,
-        reader->Read(offset, std::min(kBlobPieceBytes, record.total_bytes - offset)));
-    TF_RETURN_IF_ERROR(writer->Write(offset, bytes));
-  }
-  return writer->Finish().status();
-}
-
-absl::StatusOr<int64_t> MigrateCases(CaseStore& from, CaseStore& to) {
-  int64_t count = 0;
-  // Those of one name may be parted by the end of a page: all in one.
-  TF_ASSIGN_OR_RETURN(const CaseStore::Page page,
-                      from.List({.limit = std::numeric_limits<int>::max()}));
-  for (const CaseRecord& record : page.records) {
-    TF_RETURN_IF_ERROR(MigrateCase(from, record, to));
-    ++count;
-  }
-  return count;
-}
-
-absl::StatusOr<int64_t> MigrateAccess(Stores* from, PostgresPool* to) {
-  TF_ASSIGN_OR_RETURN(AccessRows rows, OpenAccessStore(from)->Load());
-  const auto count =
-      static_cast<int64_t>(rows.shares.size() + rows.links.size() + rows.mesh_rights.size());
-  PostgresAccessStore store(to);
-  TF_RETURN_IF_ERROR(AnswerOf<absl::Status>([&](std::function<void(absl::Status)> done) {
-    store.Change({}, std::move(rows), std::move(done));
-  }));
-  return count;
-}
-
-absl::StatusOr<int64_t> MigrateExports(Stores* from, PostgresPool* to) {
-  TF_ASSIGN_OR_RETURN(const std::vector<ExportRecord> records, OpenExportStore(from)->Load());
-  PostgresExportStore store(to);
-  TF_RETURN_IF_ERROR(store.PutAll(records));
-  return static_cast<int64_t>(records.size());
-}
-
 }  // namespace
 
-absl::StatusOr<MigrationSummary> MigrateStore(Stores* from, PostgresStores* to) {
+absl::StatusOr<MigrationSummary> MigrateStore(SqlStores* from, PostgresStores* to) {
   TF_RETURN_IF_ERROR(CheckEmpty(to->pool()));
-  MigrationSummary summary;
-  TF_ASSIGN_OR_RETURN(summary.meshes, MigrateMeshes(from->meshes(), to->meshes()));
-  TF_ASSIGN_OR_RETURN(summary.cases, MigrateCases(from->cases(), to->cases()));
-  TF_ASSIGN_OR_RETURN(summary.predictions,
-                      MigratePredictions(from->predictions(), to->predictions()));
-  TF_ASSIGN_OR_RETURN(summary.access_rows, MigrateAccess(from, to->pool()));
-  TF_ASSIGN_OR_RETURN(summary.exports, MigrateExports(from, to->pool()));
-  TF_ASSIGN_OR_RETURN(summary.sessions, MigrateSessions(from->sessions(), to->pool()));
-  return summary;
+  TF_RETURN_IF_ERROR(CopyAllBlobs(from, to));
+  std::map<std::string, int64_t> counts;
+  for (const StoredTable& table : kStoredTables) {
+    TF_ASSIGN_OR_RETURN(counts[table.name], CopyTable(from, table, to->pool()));
+  }
+  TF_RETURN_IF_ERROR(GoOnCounting(to->pool()));
+  return MigrationSummary{
+      .sessions = counts["sessions"],
+      .meshes = counts["meshes"],
+      .predictions = counts["predictions"],
+      .cases = counts["cases"],
+      .access_rows = counts["shares"] + counts["follow_links"] + counts["mesh_rights"],
+      .exports = counts["exports"]};
 }
 
 }  // namespace tissueform

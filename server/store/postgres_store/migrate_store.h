@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/store/postgres_store/postgres_stores.h"
-#include "server/store/stores.h"
+#include "server/store/sql_stores.h"
 
 namespace tissueform {
 
@@ -21,13 +21,13 @@ struct MigrationSummary {
   int64_t exports = 0;
 };
 
-// Carries all that one server has kept (a DurableStore, which has checked it) over into the empty
-// store of several: with ids, etags, epochs and times, so that clients go on with what they have.
-// Every blob is read with its digest. Meshes that have not arrived in full stay behind: their
-// clients send them anew. `from` stays as it is, and nobody else may use it meanwhile.
+// Copies all that one server has kept (a DurableStore, which has checked it) into the empty store
+// of several, table by table: with ids, etags, epochs and times, so that clients go on with what
+// they have. Every blob is read with its digest. Meshes that have not arrived in full stay behind:
+// their clients send them anew. `from` stays as it is, and nobody else may use it meanwhile.
 //
 // Errors: FailedPrecondition (there is something in `to`), DataLoss (a blob of `from` is damaged),
 // or those of the stores. After an error `to` holds a part: empty its database, and begin anew.
-absl::StatusOr<MigrationSummary> MigrateStore(Stores* from, PostgresStores* to);
+absl::StatusOr<MigrationSummary> MigrateStore(SqlStores* from, PostgresStores* to);
 
 }  // namespace tissueform

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,43 +14,42 @@
 #include "absl/strings/string_view.h"
 
 #include "server/store/postgres_store/postgres_pool.h"
+#include "server/store/sql_blobs.h"
 
-// Bytes named by their SHA-256, as rows of 1 MiB. A blob and the row that claims it are written in
-// one transaction, and go in one: there are none that nobody claims. Whoever writes or removes a
-// claim has locked its blob before (PutBlob, LockBlob), so that these take turns.
 namespace tissueform {
 
-inline constexpr int64_t kBlobPieceBytes = int64_t{1} << 20;
+// Blobs as rows of 1 MiB. A blob and the row that claims it are written in one transaction, and go
+// in one: there are none that nobody claims. Whoever writes or removes a claim has locked its blob
+// before, so that these take turns.
+//
+// A damaged blob that is set aside stays under the name "damaged KEY SHA-256".
+class PostgresBlobs final : public SqlBlobs {
+ public:
+  static constexpr int64_t kPieceBytes = int64_t{1} << 20;
 
-// `size` bytes from `offset` on; they are there.
-using BlobSource = std::function<absl::StatusOr<std::string>(int64_t offset, int64_t size)>;
-using BlobSink = std::function<absl::Status(absl::string_view)>;
+  // `pool` must outlive it.
+  explicit PostgresBlobs(PostgresPool* pool) : pool_(pool) {}
 
-// Bytes that lie one after the other; `parts` and what they show must outlive it.
-BlobSource SourceOfParts(const std::vector<absl::string_view>& parts);
+  absl::Status Put(const std::string& sha256, const std::vector<absl::string_view>& parts,
+                   const SqlWork& claim) override;
+  // In a nameless file until it is kept.
+  absl::StatusOr<std::unique_ptr<Incoming>> Receive() override;
+  absl::Status Read(const FindClaim& find, const Sink& sink) override;
+  // A nameless copy.
+  absl::StatusOr<OpenFile> Open(const FindClaim& find) override;
+  absl::Status Lock(SqlTransaction& transaction, const std::string& sha256) override;
+  absl::Status Remove(const Release& release) override;
+  absl::Status SetAside(const std::string& sha256, const absl::Status& damage) override;
 
-// Keeps a blob, or finds that it is there in full; locks it. REQUIRES: sha256 is that of all bytes.
-absl::Status PutBlob(PostgresTransaction& transaction, const std::string& sha256, int64_t bytes,
-                     const BlobSource& source);
+ private:
+  class IncomingFile;
+  // `size` bytes from `offset` on; they are there.
+  using Source = std::function<absl::StatusOr<std::string>(int64_t offset, int64_t size)>;
 
-// Nothing happens when it is not there.
-absl::Status LockBlob(PostgresTransaction& transaction, const std::string& sha256);
+  absl::Status PutFrom(const std::string& sha256, int64_t bytes, const Source& source,
+                       const SqlWork& claim);
 
-// What is read from here on is of one moment. First of all in a transaction.
-absl::Status ReadOneMoment(PostgresTransaction& transaction);
-
-// Calls `sink` for all bytes in order, then checks the digest. REQUIRES: ReadOneMoment, and its
-// claim was read in this transaction. Errors: DataLoss (it is not `bytes` long; bytes have another
-// SHA-256), after whatever was given; those of `sink`.
-absl::Status ReadBlob(PostgresTransaction& transaction, const std::string& sha256, int64_t bytes,
-                      const BlobSink& sink);
-
-// Removes the blob when no row claims it any longer. REQUIRES: it is locked.
-absl::Status RemoveUnclaimedBlob(PostgresTransaction& transaction, const std::string& sha256);
-
-// Takes a damaged blob out of the store: rows that claim it go, and its bytes stay under the name
-// "damaged KEY SHA-256". Returns `damage`, or why that failed.
-absl::Status SetPostgresBlobAside(PostgresPool* pool, const std::string& sha256,
-                                  const absl::Status& damage);
+  PostgresPool* const pool_;
+};
 
 }  // namespace tissueform

@@ -22,7 +22,7 @@ absl::Status PostgresClock::Ask() {
   return pool_->Run(
       [this](PostgresTransaction& transaction) -> absl::Status {
         TF_ASSIGN_OR_RETURN(
-            const PostgresRows rows,
+            const SqlRows rows,
             transaction.Query("SELECT (extract(epoch FROM tissueform_now()) * 1000)::bigint", {}));
         ahead_ms_ = rows.Integer(0, 0) - SteadyMs();
         return absl::OkStatus();

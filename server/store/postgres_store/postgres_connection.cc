@@ -15,6 +15,7 @@
 #include <sys/socket.h>
 
 #include "server/store/postgres_store/postgres_errors.h"
+#include "server/store/postgres_store/postgres_rows.h"
 #include "server/store/store_errors.h"
 
 namespace tissueform {
@@ -41,8 +42,7 @@ class LibraryTransaction final : public PostgresTransaction {
   LibraryTransaction(const std::string& name, pqxx::work* work, std::atomic<Ticks>* waits_since)
       : name_(name), work_(work), waits_since_(waits_since) {}
 
-  absl::StatusOr<PostgresRows> Query(const char* sql,
-                                     std::initializer_list<PostgresValue> values) override {
+  absl::StatusOr<SqlRows> Query(const char* sql, absl::Span<const SqlValue> values) override {
     const std::vector<pqxx::binarystring> parameters = ToParameters(values);
     const WaitForAnswer wait(waits_since_);
     try {

@@ -4,8 +4,8 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
-#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,7 +14,7 @@
 #include "absl/status/statusor.h"
 
 #include "server/store/postgres_store/postgres_options.h"
-#include "server/store/postgres_store/postgres_rows.h"
+#include "server/store/sql_database.h"
 
 namespace tissueform {
 
@@ -26,18 +26,16 @@ enum class PostgresOutcome {
   kUnknown,    // the connection was lost while it was committed
 };
 
-class PostgresTransaction {
+class PostgresTransaction : public SqlTransaction {
  public:
-  virtual ~PostgresTransaction() = default;
-
-  // One statement. After an error the transaction is lost: return it.
-  virtual absl::StatusOr<PostgresRows> Query(const char* sql,
-                                             std::initializer_list<PostgresValue> values) = 0;
   // Statements without parameters and rows.
   virtual absl::Status Execute(const std::string& sql) = 0;
 
-  absl::Status Run(const char* sql, std::initializer_list<PostgresValue> values) {
-    return Query(sql, values).status();
+  absl::Status TakeTurns(int64_t number) override {
+    return Run("SELECT pg_advisory_xact_lock($1)", {number});
+  }
+  absl::Status ReadOneMoment() override {
+    return Execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY");
   }
 };
 

@@ -27,7 +27,7 @@ constexpr int64_t kLeastConnectSeconds = 2;
 
 absl::Status CheckDatabase(const std::string& name, PostgresTransaction& transaction) {
   TF_ASSIGN_OR_RETURN(
-      const PostgresRows rows,
+      const SqlRows rows,
       transaction.Query("SELECT pg_is_in_recovery()::text, current_setting('server_encoding'), "
                         "current_setting('synchronous_commit')",
                         {}));

@@ -104,19 +104,4 @@ class PostgresPool {
   std::thread watch_;  // last: it uses the others
 };
 
-// The result of `work`. Say kYes where it only reads or a second commit changes nothing.
-template <typename Result>
-absl::StatusOr<Result> AskPool(
-    PostgresPool* pool, const std::function<absl::StatusOr<Result>(PostgresTransaction&)>& work,
-    PostgresPool::Idempotent idempotent = PostgresPool::Idempotent::kYes) {
-  absl::StatusOr<Result> result;
-  const absl::Status status = pool->Run(
-      [&](PostgresTransaction& transaction) {
-        result = work(transaction);
-        return result.status();
-      },
-      idempotent);
-  return status.ok() ? std::move(result) : status;
-}
-
 }  // namespace tissueform

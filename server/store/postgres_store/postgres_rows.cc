@@ -3,7 +3,11 @@
 
 #include "server/store/postgres_store/postgres_rows.h"
 
-#include "absl/strings/numbers.h"
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <variant>
+
 #include <pqxx/pqxx>
 
 namespace tissueform {
@@ -11,9 +15,12 @@ namespace {
 
 constexpr pqxx::oid kByteaType = 17;
 
-pqxx::binarystring ToBinary(const PostgresValue& value) {
+pqxx::binarystring ToBinary(const SqlValue& value) {
   if (const auto* text = std::get_if<absl::string_view>(&value)) {
     return pqxx::binarystring(text->data(), text->size());
+  }
+  if (const auto* bytes = std::get_if<SqlBytes>(&value)) {
+    return pqxx::binarystring(bytes->bytes.data(), bytes->bytes.size());
   }
   auto number = static_cast<uint64_t>(std::get<int64_t>(value));
   std::string bytes(sizeof(number), '\0');
@@ -23,23 +30,18 @@ pqxx::binarystring ToBinary(const PostgresValue& value) {
 
 }  // namespace
 
-int64_t PostgresRows::Integer(size_t row, size_t column) const {
-  int64_t number = 0;
-  return absl::SimpleAtoi(rows_[row][column], &number) ? number : 0;
-}
-
-std::vector<pqxx::binarystring> ToParameters(std::initializer_list<PostgresValue> values) {
+std::vector<pqxx::binarystring> ToParameters(absl::Span<const SqlValue> values) {
   std::vector<pqxx::binarystring> parameters;
   parameters.reserve(values.size());
-  for (const PostgresValue& value : values) parameters.push_back(ToBinary(value));
+  for (const SqlValue& value : values) parameters.push_back(ToBinary(value));
   return parameters;
 }
 
-PostgresRows ToRows(const pqxx::result& result) {
-  std::vector<PostgresRows::Row> rows;
+SqlRows ToRows(const pqxx::result& result) {
+  std::vector<SqlRows::Row> rows;
   rows.reserve(result.size());
   for (const pqxx::row& from : result) {
-    PostgresRows::Row row;
+    SqlRows::Row row;
     row.reserve(from.size());
     for (const pqxx::field& field : from) {
       if (field.type() == kByteaType && !field.is_null()) {
@@ -51,7 +53,7 @@ PostgresRows ToRows(const pqxx::result& result) {
     }
     rows.push_back(std::move(row));
   }
-  return PostgresRows(std::move(rows));
+  return SqlRows(std::move(rows));
 }
 
 }  // namespace tissueform

@@ -8,13 +8,12 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "server/store/store_schema.h"
 
 namespace tissueform {
 namespace {
 
 // Any number that other programs on this database do not lock.
-constexpr char kTakeTurns[] = "SELECT pg_advisory_xact_lock(6073473466130133612)";
+constexpr int64_t kTakeTurns = 6073473466130133612;
 
 // The first version that a PostgreSQL database has had.
 constexpr char kTablesOfVersion4[] = R"sql(
@@ -120,30 +119,30 @@ CREATE SEQUENCE session_epochs MINVALUE 2;
 )sql";
 
 absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transaction) {
-  TF_RETURN_IF_ERROR(transaction.Execute(kTakeTurns));
+  TF_RETURN_IF_ERROR(transaction.TakeTurns(kTakeTurns));
   TF_ASSIGN_OR_RETURN(const int64_t version, PostgresSchemaVersion(transaction));
-  if (version > kSchemaVersion) {
+  if (version > kPostgresSchemaVersion) {
     return absl::FailedPreconditionError(absl::StrCat(
         "database ", name, " was written by a newer server (version ", version, ", this one knows ",
-        kSchemaVersion, "); start the newer server, or name another database"));
+        kPostgresSchemaVersion, "); start the newer server, or name another database"));
   }
-  if (version == kSchemaVersion) return absl::OkStatus();
+  if (version == kPostgresSchemaVersion) return absl::OkStatus();
   if (version < 4) TF_RETURN_IF_ERROR(transaction.Execute(kTablesOfVersion4));
   if (version < 5) {
     TF_RETURN_IF_ERROR(transaction.Execute(kVersion5));
     TF_RETURN_IF_ERROR(RaiseSessionEpochs(transaction));
   }
-  return transaction.Run("UPDATE tissueform_version SET version = $1", {kSchemaVersion});
+  return transaction.Run("UPDATE tissueform_version SET version = $1", {kPostgresSchemaVersion});
 }
 
 }  // namespace
 
 absl::StatusOr<int64_t> PostgresSchemaVersion(PostgresTransaction& transaction) {
   TF_ASSIGN_OR_RETURN(
-      const PostgresRows found,
+      const SqlRows found,
       transaction.Query("SELECT (to_regclass('tissueform_version') IS NOT NULL)::int", {}));
   if (found.Integer(0, 0) == 0) return 0;
-  TF_ASSIGN_OR_RETURN(const PostgresRows rows,
+  TF_ASSIGN_OR_RETURN(const SqlRows rows,
                       transaction.Query("SELECT max(version) FROM tissueform_version", {}));
   return rows.Integer(0, 0);
 }

@@ -12,8 +12,8 @@
 
 namespace tissueform {
 
-// The tables of a store that several servers share: those of store_schema.h with the same records
-// under the same version, and
+// The tables of a store that several servers share: those of store_schema.h with the same records,
+// and
 //
 //   tissueform_version  one row: the version
 //   session_states      beside the rest who holds the session: holder, node, lease_until. The epoch
@@ -29,6 +29,7 @@ namespace tissueform {
 // the channel `tissueform_changes` by triggers (change_listener.h).
 //
 // Names are compared byte by byte (COLLATE "C"), as everywhere else.
+inline constexpr int64_t kPostgresSchemaVersion = 5;
 
 // Makes the tables where there are none, or brings those of a version before up to date, in one
 // transaction; servers that start at once take turns.

@@ -63,7 +63,7 @@ absl::StatusOr<LeaseAnswer> PostgresSessionLeases::Acquire(const std::string& se
   std::string too_late;
   TF_RETURN_IF_ERROR(Run([&](PostgresTransaction& transaction) -> absl::Status {
     TF_ASSIGN_OR_RETURN(
-        const PostgresRows taken,
+        const SqlRows taken,
         transaction.Query(
             "UPDATE session_states SET epoch = CASE WHEN holder = $2 AND lease_until > "
             "tissueform_now() THEN epoch ELSE nextval('session_epochs') END, holder = $2, node = "
@@ -80,7 +80,7 @@ absl::StatusOr<LeaseAnswer> PostgresSessionLeases::Acquire(const std::string& se
       return absl::OkStatus();
     }
     TF_ASSIGN_OR_RETURN(
-        const PostgresRows held,
+        const SqlRows held,
         transaction.Query(
             "SELECT node, CASE WHEN lease_until > tissueform_now() + $2::bigint * interval '1 "
             "millisecond' THEN lease_until::text ELSE '' END FROM session_states JOIN sessions ON "
@@ -102,7 +102,7 @@ absl::StatusOr<std::vector<SessionLease>> PostgresSessionLeases::Renew() {
     leases.clear();
     // Where one row is locked by others the leases of all others would wait, and run out, with it.
     TF_ASSIGN_OR_RETURN(
-        const PostgresRows rows,
+        const SqlRows rows,
         transaction.Query(
             "WITH mine AS (SELECT key FROM session_states WHERE holder = $1 AND lease_until > "
             "tissueform_now() ORDER BY key FOR UPDATE SKIP LOCKED), renewed AS (UPDATE "

@@ -14,8 +14,8 @@ absl::StatusOr<std::unique_ptr<PostgresStores>> PostgresStores::Open(
   TF_RETURN_IF_ERROR(PreparePostgresSchema(pool.get()));
   TF_ASSIGN_OR_RETURN(std::unique_ptr<UploadStore> uploads,
                       UploadStore::OpenTemporary(options.uploads));
-  std::unique_ptr<PostgresStores> stores(
-      new PostgresStores(options, std::move(pool), std::move(uploads)));
+  std::unique_ptr<PostgresStores> stores(new PostgresStores(
+      std::make_unique<Parts>(std::move(pool), options.clock), std::move(uploads)));
   TF_RETURN_IF_ERROR(stores->AskTime());
   return stores;
 }

@@ -8,14 +8,11 @@
 
 #include "absl/status/statusor.h"
 
-#include "server/store/access_store/access_store.h"
-#include "server/store/postgres_store/postgres_case_store.h"
+#include "server/store/postgres_store/postgres_blobs.h"
 #include "server/store/postgres_store/postgres_clock.h"
-#include "server/store/postgres_store/postgres_mesh_store.h"
+#include "server/store/postgres_store/postgres_database.h"
 #include "server/store/postgres_store/postgres_pool.h"
-#include "server/store/postgres_store/postgres_prediction_store.h"
-#include "server/store/postgres_store/postgres_session_store.h"
-#include "server/store/stores.h"
+#include "server/store/sql_stores.h"
 
 namespace tissueform {
 
@@ -28,44 +25,39 @@ struct PostgresStoresOptions {
 };
 
 // All that servers keep together, in one PostgreSQL database.
-class PostgresStores final : public Stores {
+class PostgresStores final : public SqlStores {
  public:
   // Opens the store, or makes its tables. Errors: those of PostgresPool::Open and
   // PreparePostgresSchema, or what the disk says.
   static absl::StatusOr<std::unique_ptr<PostgresStores>> Open(const PostgresStoresOptions& options);
 
-  SessionStore& sessions() override { return sessions_; }
-  MeshStore& meshes() override { return meshes_; }
-  UploadStore& uploads() override { return *uploads_; }
-  PredictionStore& predictions() override { return predictions_; }
-  CaseStore& cases() override { return cases_; }
-  const DurationHistogram* latency() const override { return &pool_->latency(); }
   bool keeps() const override { return true; }
-  int64_t NowS() const override { return clock_(); }
-  absl::Status AskTime() override { return database_clock_.Ask(); }
+  int64_t NowS() const override { return parts_->clock(); }
+  absl::Status AskTime() override { return parts_->database_clock.Ask(); }
 
-  PostgresPool* pool() { return pool_.get(); }
+  PostgresPool* pool() { return parts_->pool.get(); }
 
  private:
-  PostgresStores(const PostgresStoresOptions& options, std::unique_ptr<PostgresPool> pool,
-                 std::unique_ptr<UploadStore> uploads)
-      : pool_(std::move(pool)),
-        uploads_(std::move(uploads)),
-        database_clock_(pool_.get()),
-        clock_(options.clock ? options.clock : [this] { return database_clock_.NowS(); }),
-        sessions_(pool_.get(), clock_),
-        meshes_(pool_.get()),
-        predictions_(pool_.get()),
-        cases_(pool_.get()) {}
+  struct Parts {
+    Parts(std::unique_ptr<PostgresPool> opened, const UnixClock& other_clock)
+        : pool(std::move(opened)),
+          database_clock(pool.get()),
+          clock(other_clock ? other_clock : [this] { return database_clock.NowS(); }),
+          blobs(pool.get()),
+          database(pool.get()) {}
 
-  const std::unique_ptr<PostgresPool> pool_;
-  const std::unique_ptr<UploadStore> uploads_;
-  PostgresClock database_clock_;
-  const UnixClock clock_;
-  PostgresSessionStore sessions_;
-  PostgresMeshStore meshes_;
-  PostgresPredictionStore predictions_;
-  PostgresCaseStore cases_;
+    const std::unique_ptr<PostgresPool> pool;
+    PostgresClock database_clock;
+    const UnixClock clock;
+    PostgresBlobs blobs;
+    PostgresDatabase database;  // last: its jobs use the others
+  };
+
+  PostgresStores(std::unique_ptr<Parts> parts, std::unique_ptr<UploadStore> uploads)
+      : SqlStores(&parts->database, &parts->blobs, std::move(uploads), parts->clock),
+        parts_(std::move(parts)) {}
+
+  const std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace tissueform

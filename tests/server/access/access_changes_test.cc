@@ -13,7 +13,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/access_store/in_memory_access_store.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {

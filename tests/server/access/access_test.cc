@@ -12,8 +12,8 @@
 #include "server/access/access_changes.h"
 #include "server/exports/export_queue.h"
 #include "server/exports/export_store.h"
-#include "server/store/access_store/in_memory_access_store.h"
-#include "server/store/in_memory_stores.h"
+#include "server/store/sql_stores.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {
@@ -64,7 +64,8 @@ class AccessTest : public ::testing::Test {
   int64_t now_s_ = 1000;
   InMemoryAccessStore store_;
   std::unique_ptr<Stores> stores_ = *OpenInMemoryStores();
-  std::unique_ptr<ExportStore> export_store_ = OpenExportStore(stores_.get());
+  std::unique_ptr<ExportStore> export_store_ =
+      std::make_unique<SqlExportStore>(&stores_->database());
   ExportQueue exports_{{}, export_store_.get()};
   Access access_{[this] { return now_s_; }, &exports_};
   AccessChanges changes_{{}, &store_, &access_};

@@ -12,7 +12,7 @@
 #include "gtest/gtest.h"
 
 #include "server/access/access_changes.h"
-#include "server/store/access_store/in_memory_access_store.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {

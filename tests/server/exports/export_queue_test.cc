@@ -14,7 +14,7 @@
 #include "gtest/gtest.h"
 
 #include "core/base/error_reason.h"
-#include "server/store/in_memory_stores.h"
+#include "server/store/sql_stores.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {
@@ -76,7 +76,7 @@ class ExportQueueTest : public ::testing::Test {
   int64_t now_s_ = 1'800'000'000;
   ExportLimits limits_ = {};
   std::unique_ptr<Stores> stores_ = *OpenInMemoryStores();
-  std::unique_ptr<ExportStore> kept_ = OpenExportStore(stores_.get());
+  std::unique_ptr<ExportStore> kept_ = std::make_unique<SqlExportStore>(&stores_->database());
   BrokenStore store_{kept_.get()};
   int changes_ = 0;
   std::unique_ptr<ExportQueue> book_;

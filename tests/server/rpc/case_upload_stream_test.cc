@@ -17,8 +17,8 @@
 
 #include "core/mesh/payload/sha256.h"
 #include "server/rpc/case_service.h"
-#include "server/store/in_memory_case_store.h"
 #include "tests/testing/fake_calls.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/no_logins.h"
 #include "tests/testing/status_matchers.h"
 

@@ -13,7 +13,7 @@
 #include "gtest/gtest.h"
 
 #include "core/mesh/payload/sha256.h"
-#include "server/store/in_memory_stores.h"
+#include "server/store/sql_stores.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
@@ -182,6 +182,7 @@ class SharedStores final : public Stores {
   UploadStore& uploads() override { return stores_.uploads(); }
   PredictionStore& predictions() override { return stores_.predictions(); }
   CaseStore& cases() override { return stores_.cases(); }
+  SqlDatabase& database() override { return stores_.database(); }
   bool keeps() const override { return true; }
   int64_t NowS() const override { return now_s_; }
   absl::Status AskTime() override { return answer; }

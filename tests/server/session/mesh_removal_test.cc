@@ -18,9 +18,8 @@
 
 #include "core/base/error_reason.h"
 #include "server/session/session_registry.h"
-#include "server/store/in_memory_session_store.h"
-#include "server/store/in_memory_stores.h"
 #include "tests/testing/fake_clock.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
 #include "tests/testing/status_matchers.h"

@@ -15,8 +15,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/in_memory_session_store.h"
 #include "tests/testing/fake_clock.h"
+#include "tests/testing/in_memory_stores.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/session_samples.h"
 #include "tests/testing/status_matchers.h"

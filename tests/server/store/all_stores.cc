@@ -6,7 +6,7 @@
 
 #include "server/platform/storage/data_folder.h"
 #include "server/store/durable_store.h"
-#include "server/store/in_memory_stores.h"
+#include "server/store/sql_stores.h"
 #include "tests/server/store/stores_case.h"
 
 namespace tissueform {
@@ -24,6 +24,7 @@ class ScratchDurableStore final : public Stores {
   UploadStore& uploads() override { return store_->uploads(); }
   PredictionStore& predictions() override { return store_->predictions(); }
   CaseStore& cases() override { return store_->cases(); }
+  SqlDatabase& database() override { return store_->database(); }
   bool keeps() const override { return true; }
 
  private:

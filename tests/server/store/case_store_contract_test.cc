@@ -11,7 +11,6 @@
 #include "gtest/gtest.h"
 
 #include "server/store/case_store.h"
-#include "server/store/in_memory_case_store.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/stores_case.h"
 #include "tests/testing/status_matchers.h"
@@ -260,25 +259,6 @@ TEST_P(CaseStoreContractTest, KeepingAndDeletingOneCaseAtOnceLeavesItWholeOrGone
   for (std::thread& thread : threads) thread.join();
   ASSERT_THAT(KeepCase(*store_, record, bytes), IsOk());
   EXPECT_THAT(ReadWholeCase(*store_, record.sha256), Holds(bytes));
-}
-
-TEST(InMemoryCaseStoreTest, HoldsSoManyBytesThoseOnTheirWayIncluded) {
-  InMemoryCaseStore store(10'000);
-  const std::string a = SampleCase(1);
-  const std::string b = SampleCase(2);
-  const std::string c = SampleCase(3);
-  ASSERT_THAT(KeepCase(store, CaseRecordOf(a), a), IsOk());
-  ASSERT_THAT(KeepCase(store, CaseRecordOf(a), a), IsOk()) << "held once";
-  {
-    ASSERT_OK_AND_ASSIGN(const auto writer, store.Begin(CaseRecordOf(b), 100));
-    ASSERT_THAT(writer->Write(0, b), IsOk());
-    EXPECT_THAT(KeepCase(store, CaseRecordOf(c), c),
-                StatusIs(Code::kResourceExhausted, HasSubstr("--data-dir")));
-  }
-  ASSERT_THAT(KeepCase(store, CaseRecordOf(c), c), IsOk());
-  EXPECT_THAT(KeepCase(store, CaseRecordOf(b), b), StatusIs(Code::kResourceExhausted));
-  ASSERT_THAT(store.Delete(SampleCaseKey(CaseRecordOf(a).sha256)), IsOk());
-  EXPECT_THAT(KeepCase(store, CaseRecordOf(b), b), IsOk());
 }
 
 INSTANTIATE_TEST_SUITE_P(Stores, CaseStoreContractTest, ::testing::ValuesIn(AllStores()),

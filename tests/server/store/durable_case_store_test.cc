@@ -1,8 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/store/durable_case_store.h"
-
 #include <filesystem>
 #include <fstream>
 #include <iterator>

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <future>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -19,8 +20,11 @@
 #include "gtest/gtest.h"
 
 #include "core/mesh/payload/sha256.h"
+#include "server/exports/export_store.h"
 #include "server/platform/storage/database.h"
-#include "server/store/commit_thread.h"
+#include "server/store/access_store/sql_access_store.h"
+#include "server/store/store_records.h"
+#include "server/store/store_schema.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/store_workload.h"
 #include "tests/server/store/stores_case.h"
@@ -352,7 +356,7 @@ TEST_F(DurableStoreTest, AStoreOfANewerServerOrAnotherProgramIsRefused) {
   Fill(1);
   Sql("PRAGMA user_version=99");
   EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("newer server")));
-  Sql("PRAGMA user_version=5; PRAGMA application_id=7");
+  Sql(absl::StrCat("PRAGMA user_version=", kSchemaVersion, "; PRAGMA application_id=7"));
   EXPECT_THAT(Open(), StatusIs(absl::StatusCode::kFailedPrecondition,
                                HasSubstr("does not belong to tissueform")));
   Sql("PRAGMA application_id=" + absl::StrCat(0x54697346));
@@ -384,78 +388,31 @@ TEST_F(DurableStoreTest, AStoreOfTheVersionBeforeIsBroughtUpToDate) {
   ExpectSession(1);
 }
 
-// A folder as a server before this one left it (tests/data/store/SOURCE.md).
-TEST_F(DurableStoreTest, AFolderFromBeforeThereWereCasesKeepsAllThatItHadAndTakesCases) {
-  constexpr int kStepsOfVersion2 = 16;
-  std::filesystem::copy(testing::SourcePath("tests/data/store/version2"), path_,
-                        std::filesystem::copy_options::recursive);
-  std::filesystem::permissions(path_, std::filesystem::perms::owner_all);
-  StoreModel model;
-  for (int number = 0; number < kStepsOfVersion2; ++number) {
-    ApplyStep(number, /*bursts=*/true, &model);
-  }
-  model.uploads.clear();  // not copied
-  ASSERT_FALSE(model.predictions.empty());
+TEST_F(DurableStoreTest, RightsAndExportsAreThereAfterARestart) {
   ASSERT_THAT(Open(), IsOk());
-  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
-  ASSERT_OK_AND_ASSIGN(const PredictionStore::Page of_no_case,
-                       store_->predictions().List({.case_sha256 = ""}));
-  EXPECT_THAT(of_no_case.records, SizeIs(model.predictions.size()));
-  for (int number = kStepsOfVersion2; number < kStepsOfARound; ++number) {
-    ASSERT_THAT(RunStep(number, /*bursts=*/true, *store_), IsOk());
-    ApplyStep(number, /*bursts=*/true, &model);
-  }
-  EXPECT_THAT(model.cases, SizeIs(1));
+  const FollowLinkRow link = {.digest = std::string(64, 'd'), .session = "a", .maker = "ann"};
+  const ExportRecord record = {.id = "a", .prediction = "p"};
+  ASSERT_THAT(WaitFor<absl::Status>([&](auto done) {
+                SqlAccessStore(&store_->database()).Change({}, {.links = {link}}, done);
+              }),
+              IsOk());
+  ASSERT_THAT(SqlExportStore(&store_->database()).Put(record), IsOk());
   ASSERT_THAT(Open(), IsOk());
-  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
+  ASSERT_OK_AND_ASSIGN(const AccessRows rows, SqlAccessStore(&store_->database()).Load());
+  EXPECT_THAT(rows.links, ElementsAre(link));
+  EXPECT_THAT(SqlExportStore(&store_->database()).Load(), IsOk());
+  EXPECT_THAT(*SqlExportStore(&store_->database()).Load(), ElementsAre(record));
 }
 
-TEST_F(DurableStoreTest, AFolderFromBeforeThereWereRightsKeepsAllAndTakesACaseOfEveryOwner) {
-  constexpr int kStepsOfVersion3 = 17;
-  std::filesystem::copy(testing::SourcePath("tests/data/store/version3"), path_,
-                        std::filesystem::copy_options::recursive);
-  std::filesystem::permissions(path_, std::filesystem::perms::owner_all);
-  StoreModel model;
-  for (int number = 0; number < kStepsOfVersion3; ++number) {
-    ApplyStep(number, /*bursts=*/true, &model);
-  }
-  model.uploads.clear();  // not copied
-  ASSERT_THAT(model.cases, SizeIs(1));
+TEST_F(DurableStoreTest, AMeshThatASessionIsMadeFromCannotBeDeleted) {
   ASSERT_THAT(Open(), IsOk());
-  EXPECT_THAT(store_->damaged(), IsEmpty());
-  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
-  const std::string bytes = SampleCase(*model.cases.begin());
-  CaseRecord others = CaseRecordOf(bytes);
-  others.owner = "another";
-  ASSERT_THAT(KeepCase(store_->cases(), others, bytes), IsOk());
-  ASSERT_THAT(Open(), IsOk());
-  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
-  EXPECT_THAT(store_->cases().Find(others.key()), IsOk());
-}
-
-TEST_F(DurableStoreTest, AFolderFromBeforeThereWereExportsKeepsAllAndTakesExports) {
-  constexpr int kStepsOfVersion4 = 17;
-  std::filesystem::copy(testing::SourcePath("tests/data/store/version4"), path_,
-                        std::filesystem::copy_options::recursive);
-  std::filesystem::permissions(path_, std::filesystem::perms::owner_all);
-  StoreModel model;
-  for (int number = 0; number < kStepsOfVersion4; ++number) {
-    ApplyStep(number, /*bursts=*/true, &model);
-  }
-  model.uploads.clear();  // not copied
-  ASSERT_FALSE(model.predictions.empty());
-  ASSERT_THAT(Open(), IsOk());
-  EXPECT_THAT(store_->damaged(), IsEmpty());
-  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
-  ASSERT_THAT(
-      store_->commit_thread()->Run(
-          {.work =
-               [](Database& database) {
-                 return database.Execute("INSERT INTO exports (name, record) VALUES ('a', x'00')");
-               }}),
-      IsOk());
-  ASSERT_THAT(Open(), IsOk());
-  EXPECT_THAT(CheckAgainst(model, model, *store_), IsOk());
+  const MeshPayload mesh = SamplePayload(1);
+  ASSERT_THAT(store_->meshes().Put(RecordOf(mesh), mesh.View()), IsOk());
+  ASSERT_THAT(CreateSession(store_->sessions(), SampleSession("s", 1)), IsOk());
+  EXPECT_THAT(store_->meshes().Delete(RecordOf(mesh).sha256),
+              StatusIs(absl::StatusCode::kFailedPrecondition));
+  ASSERT_THAT(DeleteSession(store_->sessions(), "s"), IsOk());
+  EXPECT_THAT(store_->meshes().Delete(RecordOf(mesh).sha256), IsOk());
 }
 
 TEST_F(DurableStoreTest, ASecondServerIsRefused) {
@@ -487,10 +444,42 @@ TEST_F(DurableStoreTest, NothingIsAcknowledgedInADatabaseThatIsReplaced) {
 TEST_F(DurableStoreTest, ABlockingCallFromAnAnswerIsRefusedAndNoDeadlock) {
   ASSERT_THAT(Open(), IsOk());
   std::promise<absl::Status> answer;
-  store_->sessions().Get("s", [&](const absl::StatusOr<SessionRecord>&) {
-    answer.set_value(store_->meshes().Find(std::string(64, 'a')).status());
+  store_->sessions().Touch({"s"}, 1, [&](const absl::Status&) {
+    answer.set_value(store_->meshes().Touch({std::string(64, 'a')}, 1));
   });
   EXPECT_THAT(answer.get_future().get(), StatusIs(absl::StatusCode::kInternal));
+}
+
+TEST_F(DurableStoreTest, AReadDoesNotWaitForWhatIsBeingCommitted) {
+  ASSERT_THAT(Open(), IsOk());
+  Fill(1);
+  std::promise<void> begun;
+  std::promise<void> read;
+  std::promise<absl::Status> written;
+  store_->database().Submit("other",
+                            {.work =
+                                 [&](SqlTransaction&) {
+                                   begun.set_value();
+                                   read.get_future().wait();
+                                   return absl::OkStatus();
+                                 }},
+                            [&](absl::Status status) { written.set_value(std::move(status)); });
+  begun.get_future().wait();
+  EXPECT_THAT(store_->meshes().List("", 1), IsOk());
+  EXPECT_THAT(GetSession(store_->sessions(), "s0"), IsOk());
+  read.set_value();
+  EXPECT_THAT(written.get_future().get(), IsOk());
+}
+
+TEST_F(DurableStoreTest, AReadHasAllThatWasAskedForItsSessionBefore) {
+  ASSERT_THAT(Open(), IsOk());
+  Fill(1);
+  for (int number = 0; number < 100; ++number) {
+    const std::vector<HandlePose> poses = SamplePoses(number);
+    store_->sessions().CommitPoses("s0", poses, 1, [](const absl::Status&) {});
+    ASSERT_OK_AND_ASSIGN(const SessionRecord record, GetSession(store_->sessions(), "s0"));
+    ASSERT_EQ(SerializePoses(record.last_poses), SerializePoses(poses));
+  }
 }
 
 TEST_F(DurableStoreTest, EveryCallIsAnsweredBeforeTheStoreIsGone) {

@@ -7,7 +7,6 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/in_memory_stores.h"
 #include "server/store/prediction_store.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/stores_case.h"
@@ -119,18 +118,6 @@ TEST_P(PredictionStoreContractTest, ListsThoseOfACase) {
   EXPECT_EQ(page.records[0].case_sha256, std::string(64, 'f'));
   ASSERT_OK_AND_ASSIGN(page, store_->List({.case_sha256 = ""}));
   EXPECT_THAT(Ids(page), ElementsAre("b"));
-}
-
-TEST(InMemoryPredictionStoreTest, HoldsSoManyBytesAndAgainWhenSomeAreDeleted) {
-  const auto bytes =
-      static_cast<int64_t>(SamplePositions(1).size() + SamplePrediction("a").metadata.size());
-  InMemoryPredictionStore store(2 * bytes);
-  ASSERT_THAT(store.Create(SamplePrediction("a"), SamplePositions(1)), IsOk());
-  ASSERT_THAT(store.Create(SamplePrediction("b"), SamplePositions(1)), IsOk());
-  EXPECT_THAT(store.Create(SamplePrediction("c"), SamplePositions(1)),
-              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("--data-dir")));
-  ASSERT_THAT(store.Delete("a"), IsOk());
-  EXPECT_THAT(store.Create(SamplePrediction("c"), SamplePositions(1)), IsOk());
 }
 
 INSTANTIATE_TEST_SUITE_P(Stores, PredictionStoreContractTest, ::testing::ValuesIn(AllStores()),

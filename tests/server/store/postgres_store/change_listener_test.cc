@@ -11,7 +11,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/postgres_store/postgres_access_store.h"
+#include "server/store/access_store/sql_access_store.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"
@@ -67,7 +67,7 @@ TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndPosesAreNot) {
                        CreateSession(stores_->sessions(), SampleSession("s", 1)));
   ASSERT_THAT(UpdateSession(stores_->sessions(), record), IsOk());
   ASSERT_THAT(CommitPoses(stores_->sessions(), "s", SamplePoses(1)), IsOk());
-  PostgresAccessStore access(stores_->pool());
+  SqlAccessStore access(&stores_->database());
   ASSERT_THAT(WaitFor<absl::Status>([&](auto done) {
                 access.Change({}, {.mesh_rights = {{.principal = "ann", .sha256 = "e"}}}, done);
               }),

@@ -11,10 +11,10 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "server/exports/export_store.h"
 #include "server/platform/storage/data_folder.h"
+#include "server/store/access_store/sql_access_store.h"
 #include "server/store/durable_store.h"
-#include "server/store/postgres_store/postgres_access_store.h"
-#include "server/store/postgres_store/postgres_export_store.h"
 #include "server/store/postgres_store/postgres_session_leases.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
@@ -62,10 +62,10 @@ TEST_F(MigrateStoreTest, WhatOneServerHasKeptIsThereAsItWas) {
   ASSERT_THAT(KeepCase(from_->cases(), theirs, file), IsOk());
   const MeshRight right = {.principal = "ann", .sha256 = RecordOf(mesh).sha256, .bytes = 12};
   ASSERT_THAT(WaitFor<absl::Status>([&](auto done) {
-                OpenAccessStore(from_.get())->Change({}, {.mesh_rights = {right}}, done);
+                SqlAccessStore(&from_->database()).Change({}, {.mesh_rights = {right}}, done);
               }),
               IsOk());
-  ASSERT_THAT(OpenExportStore(from_.get())->Put({.id = "e", .prediction = "p"}), IsOk());
+  ASSERT_THAT(SqlExportStore(&from_->database()).Put({.id = "e", .prediction = "p"}), IsOk());
 
   ASSERT_OK_AND_ASSIGN(const MigrationSummary summary, MigrateStore(from_.get(), to_.get()));
   EXPECT_EQ(summary.sessions, kSessions);
@@ -92,9 +92,9 @@ TEST_F(MigrateStoreTest, WhatOneServerHasKeptIsThereAsItWas) {
   EXPECT_THAT(cases.records, SizeIs(2));
   ASSERT_OK_AND_ASSIGN(const std::string read, ReadWholeCase(to_->cases(), mine.sha256));
   EXPECT_EQ(read, file);
-  ASSERT_OK_AND_ASSIGN(const AccessRows access, PostgresAccessStore(to_->pool()).Load());
+  ASSERT_OK_AND_ASSIGN(const AccessRows access, SqlAccessStore(&to_->database()).Load());
   EXPECT_THAT(access.mesh_rights, ElementsAre(right));
-  EXPECT_THAT(*PostgresExportStore(to_->pool()).Load(), SizeIs(1));
+  EXPECT_THAT(*SqlExportStore(&to_->database()).Load(), SizeIs(1));
 }
 
 TEST_F(MigrateStoreTest, AStoreThatHoldsSomethingIsLeftAlone) {

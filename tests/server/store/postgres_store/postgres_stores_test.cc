@@ -18,12 +18,11 @@
 
 #include "core/base/error_reason.h"
 #include "server/exports/export_queue.h"
-#include "server/store/postgres_store/postgres_access_store.h"
+#include "server/exports/export_store.h"
+#include "server/store/access_store/sql_access_store.h"
 #include "server/store/postgres_store/postgres_blobs.h"
-#include "server/store/postgres_store/postgres_export_store.h"
 #include "server/store/postgres_store/postgres_schema.h"
 #include "server/store/store_errors.h"
-#include "server/store/store_schema.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"
@@ -112,7 +111,8 @@ TEST_F(PostgresStoresTest, WhatIsKeptIsDatedByTheDatabasesClock) {
 TEST_F(PostgresStoresTest, ALargeBlobIsManyRowsAndIsReadAsItWas) {
   const std::string mesh = PutMesh(1, 100'000);
   EXPECT_GT(Count("blob_pieces"), 2);
-  EXPECT_EQ(Count(absl::StrCat("blob_pieces WHERE length(bytes) > ", kBlobPieceBytes)), 0);
+  EXPECT_EQ(Count(absl::StrCat("blob_pieces WHERE length(bytes) > ", PostgresBlobs::kPieceBytes)),
+            0);
   ASSERT_OK_AND_ASSIGN(const MeshPayload payload, stores_->meshes().Read(mesh));
   EXPECT_EQ(payload.View().Sha256(), mesh);
   ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
@@ -220,7 +220,7 @@ TEST_F(PostgresStoresTest, ServersThatStartAtOnceMakeItsTablesOnce) {
     });
   }
   for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kSchemaVersion);
+  EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kPostgresSchemaVersion);
 }
 
 TEST_F(PostgresStoresTest, TablesOfANewerServerAreLeftAlone) {
@@ -238,7 +238,7 @@ TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatThe
       "DROP TABLE exports, nodes; DROP SEQUENCE session_epochs; UPDATE tissueform_version SET "
       "version = 4;");
   stores_ = OpenTestStores();
-  EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kSchemaVersion);
+  EXPECT_EQ(RunSql("SELECT version FROM tissueform_version").Integer(0, 0), kPostgresSchemaVersion);
   EXPECT_EQ(Count("exports"), 0);
   EXPECT_THAT(GetSession(stores_->sessions(), "s"), IsOk());
   ASSERT_OK_AND_ASSIGN(const SessionRecord next,
@@ -318,48 +318,8 @@ TEST_F(PostgresStoresTest, ADatabaseWithoutTlsIsNotTalkedToWhereTlsIsAskedFor) {
               StatusIs(Code::kUnavailable, AnyOf(HasSubstr("SSL"), HasSubstr("certificate"))));
 }
 
-TEST_F(PostgresStoresTest, AccessRowsAreKeptAsTheyWerePutLastAndDamagedOnesGiveNothing) {
-  PostgresAccessStore store(stores_->pool());
-  const ShareRow share = {
-      .resource = "sessions/a", .owner = "ann", .principal = "bob", .role = ShareRole::kPlanner};
-  ShareRow viewer = share;
-  viewer.role = ShareRole::kViewer;
-  const FollowLinkRow link = {.digest = std::string(64, 'd'), .session = "a", .maker = "ann"};
-  const MeshRight right = {.principal = "ann", .sha256 = std::string(64, 'e'), .bytes = 12};
-  const auto change = [&](AccessRows erase, AccessRows put) {
-    return WaitFor<absl::Status>([&](auto done) { store.Change(erase, put, done); });
-  };
-  ASSERT_THAT(change({}, {.shares = {viewer}, .links = {link}, .mesh_rights = {right}}), IsOk());
-  ASSERT_THAT(change({.links = {link}}, {.shares = {share}}), IsOk());
-  ASSERT_OK_AND_ASSIGN(AccessRows rows, store.Load());
-  EXPECT_THAT(rows.shares, ElementsAre(share));
-  EXPECT_THAT(rows.links, IsEmpty());
-  EXPECT_THAT(rows.mesh_rights, ElementsAre(right));
-  RunSql("UPDATE shares SET record = set_byte(record, 40, 255 - get_byte(record, 40));");
-  ASSERT_OK_AND_ASSIGN(rows, store.Load());
-  EXPECT_THAT(rows.shares, IsEmpty());
-  EXPECT_THAT(rows.mesh_rights, ElementsAre(right));
-}
-
-TEST_F(PostgresStoresTest, AnExportThatAnotherServerHasChangedIsNotOverwritten) {
-  PostgresExportStore here(stores_->pool());
-  PostgresExportStore there(stores_->pool());
-  ExportRecord record = {.id = "a", .prediction = "p"};
-  ASSERT_THAT(here.Put(record), IsOk());
-  EXPECT_THAT(here.Put(record), IsOk()) << "as after a commit whose answer was lost";
-  record.version = 2;
-  record.detail = "there";
-  ASSERT_THAT(there.Put(record), IsOk());
-  EXPECT_THAT(there.Put(record), IsOk());
-  record.detail = "here";
-  EXPECT_THAT(here.Put(record), StatusIs(Code::kAborted));
-  ASSERT_THAT(there.Erase({"a"}), IsOk());
-  record.version = 3;
-  EXPECT_THAT(here.Put(record), StatusIs(Code::kAborted)) << "what is gone does not come back";
-}
-
 TEST_F(PostgresStoresTest, OfTwoServersThatWriteTheSameWordsInTheSameSecondOneIsToldSo) {
-  PostgresExportStore store(stores_->pool());
+  SqlExportStore store(&stores_->database());
   const auto clock = [] { return int64_t{1'800'000'000}; };
   ExportQueue here({}, &store, clock);
   ExportQueue there({}, &store, clock);
@@ -381,25 +341,6 @@ TEST_F(PostgresStoresTest, AMeshThatASessionIsMadeFromCannotBeDeleted) {
   ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
   EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1)), StatusIs(Code::kNotFound))
       << "of a mesh that is gone no session is made";
-}
-
-TEST_F(PostgresStoresTest, ExportsAreKeptAsTheyWerePutLastAndDamagedOnesPassedOver) {
-  PostgresExportStore store(stores_->pool());
-  const ExportRecord a = {.id = "a", .prediction = "p", .owner = "ann", .detail = "1"};
-  ExportRecord b = {.id = "b", .prediction = "q", .owner = "bob", .measures = "m"};
-  ASSERT_THAT(store.Put(b), IsOk());
-  ASSERT_THAT(store.Put(a), IsOk());
-  b.state = ExportState::kStored;
-  b.version = 2;
-  ASSERT_THAT(store.Put(b), IsOk());
-  ASSERT_OK_AND_ASSIGN(std::vector<ExportRecord> records, store.Load());
-  EXPECT_THAT(records, ElementsAre(a, b));
-  ASSERT_THAT(store.Erase({"a", "nothing"}), IsOk());
-  ASSERT_OK_AND_ASSIGN(records, store.Load());
-  EXPECT_THAT(records, ElementsAre(b));
-  RunSql("UPDATE exports SET record = set_byte(record, 40, 255 - get_byte(record, 40));");
-  ASSERT_OK_AND_ASSIGN(records, store.Load());
-  EXPECT_THAT(records, IsEmpty());
 }
 
 }  // namespace

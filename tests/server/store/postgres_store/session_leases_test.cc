@@ -19,9 +19,8 @@
 #include "gtest/gtest.h"
 
 #include "server/store/postgres_store/postgres_session_leases.h"
-#include "server/store/postgres_store/postgres_session_rows.h"
+#include "server/store/sql_session_store.h"
 #include "server/store/store_records.h"
-#include "server/store/store_rows.h"
 #include "tests/server/store/postgres_store/lease_steps.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
@@ -204,7 +203,7 @@ TEST_F(PostgresLeasesTest, WhoStandsStillBetweenAWriteAndItsCommitKeepsNobodyFro
   LeaseAnswer second;
   const absl::Status late = pool->Run([&](PostgresTransaction& transaction) {
     absl::Status written =
-        CommitRow(transaction, "s", 0, Seal(SerializePoses({})), first.lease.epoch, 1);
+        CommitPoseRow(transaction, "s", 0, Seal(SerializePoses({})), first.lease.epoch, 1);
     if (second.mine) return written;  // tried again
     EXPECT_THAT(written, IsOk());
     RunSql("UPDATE test_clock SET now = now + interval '10 seconds';");

@@ -51,8 +51,8 @@ PostgresOptions TestDatabaseOptions(const std::string& name) {
           .password = Environment("PGPASSWORD")};
 }
 
-PostgresRows RunSql(const std::string& sql) {
-  PostgresRows rows;
+SqlRows RunSql(const std::string& sql) {
+  SqlRows rows;
   RunOrEnd(sql, [&](PostgresTransaction& transaction) -> absl::Status {
     if (sql.find(';') != std::string::npos) return transaction.Execute(sql);
     TF_ASSIGN_OR_RETURN(rows, transaction.Query(sql.c_str(), {}));
@@ -94,7 +94,9 @@ std::unique_ptr<PostgresStores> OpenTestStores(UnixClock clock, const PostgresOp
 namespace tissueform {
 
 // Where there is no database there are no stores to instantiate them with.
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(AccessStoreContractTest);
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(CaseStoreContractTest);
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ExportStoreContractTest);
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(MeshStoreContractTest);
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(PredictionStoreContractTest);
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(SessionStoreContractTest);

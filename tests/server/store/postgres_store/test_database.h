@@ -33,7 +33,7 @@ int TestDatabasePort();
 void EmptyTestDatabase();
 
 // One or more statements in a transaction of their own; a test that cannot do so ends.
-PostgresRows RunSql(const std::string& sql);
+SqlRows RunSql(const std::string& sql);
 
 // One statement that may not be in a transaction: CREATE DATABASE.
 void RunOutsideTransaction(const std::string& sql);

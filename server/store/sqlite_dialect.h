@@ -1,0 +1,15 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+
+#include "absl/strings/string_view.h"
+
+namespace tissueform {
+
+// A statement of sql_database.h in SQLite's words.
+std::string ToSqlite(absl::string_view sql);
+
+}  // namespace tissueform
