@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-// When a session that nobody uses any longer may be evicted (SessionEvictor::kInUse).
+// When a session that nobody uses any longer may be evicted (SessionTable::kInUse).
 constexpr int64_t kSessionsInUseMs = 10'000;
 
 std::string Mebibytes(int64_t bytes) {
@@ -68,28 +68,21 @@ int64_t MemoryBudget::most_reserved_bytes() const {
   return most_reserved_bytes_;
 }
 
-void MemoryBudget::set_account_limit(int64_t bytes, AccountReclaimer reclaimer) {
-  account_limit_bytes_ = bytes;
-  account_reclaimer_ = std::move(reclaimer);
-}
-
 MemoryBudget* MemoryBudget::AccountOf(const std::string& owner) {
   if (owner.empty() || account_limit_bytes_ == 0) return this;
   MutexLock lock(accounts_mutex_);
   std::unique_ptr<MemoryBudget>& account = accounts_[owner];
   if (account == nullptr) {
-    account = absl::WrapUnique(new MemoryBudget(account_limit_bytes_, this));
-    account->set_reclaimer([this, owner](int64_t bytes) { account_reclaimer_(owner, bytes); });
+    account = absl::WrapUnique(new MemoryBudget(account_limit_bytes_, this, owner));
   }
   return account.get();
 }
 
 absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
   bool taken = TryTake(bytes);
-  // Once more and no oftener: it has given back all that can be spared, and another may have taken
-  // that. No lock is held, since what is reclaimed comes back through GiveBack.
-  if (!taken && reclaimer_) {
-    reclaimer_(bytes);
+  // Once more and no oftener: all that can be spared was given back, and another may have taken it.
+  if (!taken) {
+    (whole_ == nullptr ? this : whole_)->ReportShortage({owner_, bytes});
     taken = TryTake(bytes);
   }
   if (!taken) return Refusal(bytes, what);
@@ -97,6 +90,43 @@ absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
   const absl::Status of_whole = whole_->Take(bytes, what);
   if (!of_whole.ok()) GiveBackHere(bytes);
   return of_whole;
+}
+
+void MemoryBudget::ReportShortage(const Shortage& shortage) {
+  MutexLock lock(mutex_);
+  if (!reclaims_) return;
+  shortages_.push_back(shortage);
+  const int64_t number = ++num_reported_;
+  reported_or_answered_.NotifyAll();
+  while (num_answered_ < number) reported_or_answered_.Wait(mutex_);
+}
+
+std::optional<MemoryBudget::Shortage> MemoryBudget::WaitForShortage() {
+  MutexLock lock(mutex_);
+  while (reclaims_ && shortages_.empty()) reported_or_answered_.Wait(mutex_);
+  if (!reclaims_) return std::nullopt;
+  Shortage oldest = std::move(shortages_.front());
+  shortages_.pop_front();
+  return oldest;
+}
+
+void MemoryBudget::AnswerShortage() {
+  MutexLock lock(mutex_);
+  num_answered_ = std::min(num_answered_ + 1, num_reported_);
+  reported_or_answered_.NotifyAll();
+}
+
+void MemoryBudget::BeginReclaiming() {
+  MutexLock lock(mutex_);
+  reclaims_ = true;
+}
+
+void MemoryBudget::EndReclaiming() {
+  MutexLock lock(mutex_);
+  reclaims_ = false;
+  shortages_.clear();
+  num_answered_ = num_reported_;
+  reported_or_answered_.NotifyAll();
 }
 
 absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const {

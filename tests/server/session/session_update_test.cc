@@ -34,7 +34,7 @@ using testing::StatusIs;
 using testing::Store;
 
 using Opened = absl::StatusOr<std::shared_ptr<Session>>;
-using Updated = absl::StatusOr<SessionRegistry::View>;
+using Updated = absl::StatusOr<SessionView>;
 
 class SessionUpdateTest : public ::testing::Test {
  protected:
@@ -44,16 +44,16 @@ class SessionUpdateTest : public ::testing::Test {
     SessionRecord record = BarRecord(*bar_);
     record.id = "a";
     std::promise<Opened> made;
-    registry_.Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
-                     [&made](Opened session) { made.set_value(std::move(session)); });
+    registry_.loader().Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+                              [&made](Opened session) { made.set_value(std::move(session)); });
     first_ = made.get_future().get().value();
   }
   ~SessionUpdateTest() override { pool_.reset(); }
 
   std::shared_ptr<Session> Open() {
     std::promise<Opened> opened;
-    registry_.Open("a", std::make_shared<std::atomic<bool>>(),
-                   [&opened](Opened session) { opened.set_value(std::move(session)); });
+    registry_.loader().Open("a", std::make_shared<std::atomic<bool>>(),
+                            [&opened](Opened session) { opened.set_value(std::move(session)); });
     Opened session = opened.get_future().get();
     EXPECT_THAT(session, IsOk());
     return session.value_or(nullptr);
@@ -67,9 +67,9 @@ class SessionUpdateTest : public ::testing::Test {
 
   std::future<Updated> Update(
       const std::string& etag, std::function<void(SessionRecord*)> change,
-      SessionRegistry::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
+      SessionLoader::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
     auto promise = std::make_shared<std::promise<Updated>>();
-    registry_.Update(
+    registry_.loader().Update(
         "a", etag,
         [change = std::move(change)](SessionRecord record, const StoredMesh& /*mesh*/) {
           change(&record);
@@ -81,8 +81,8 @@ class SessionUpdateTest : public ::testing::Test {
 
   absl::Status Commit(const std::shared_ptr<Session>& session, const HandlePose& pose) {
     std::promise<absl::Status> done;
-    registry_.CommitPoses(session, {pose},
-                          [&done](absl::Status status) { done.set_value(std::move(status)); });
+    registry_.sync().CommitPoses(
+        session, {pose}, [&done](absl::Status status) { done.set_value(std::move(status)); });
     return done.get_future().get();
   }
 
@@ -108,10 +108,9 @@ class SessionUpdateTest : public ::testing::Test {
 
 TEST_F(SessionUpdateTest, TheNameStaysAndTheRestIsWhatIsAskedFor) {
   const SessionRecord before = Record();
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view,
-                       Update(before.etag, [](SessionRecord* record) {
-                         record->model = DeformationModel::kLinearElastic;
-                       }).get());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, Update(before.etag, [](SessionRecord* record) {
+                                                 record->model = DeformationModel::kLinearElastic;
+                                               }).get());
   EXPECT_EQ(view.session->model(), DeformationModel::kLinearElastic);
   EXPECT_EQ(view.session, Open());
   EXPECT_EQ(Record().model, DeformationModel::kLinearElastic);
@@ -186,7 +185,7 @@ TEST_F(SessionUpdateTest, PosesThatAreCommittedWhileItIsPreparedAreKept) {
   std::future<Updated> updated = Update("", Soften);
   EXPECT_THAT(Commit(first_, Moved(7)), IsOk());
   go.set_value();
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, updated.get());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, updated.get());
   ASSERT_EQ(view.record.last_poses.size(), 1U);
   EXPECT_EQ(view.record.last_poses[0].translation_mm.x(), 7);
   // A stream that has not noticed yet; its poses still fit.
@@ -206,17 +205,17 @@ TEST_F(SessionUpdateTest, OtherHandlesBeginAtRestAndTakeNoPosesOfTheOldOnes) {
 }
 
 TEST_F(SessionUpdateTest, WhoHoldsAnEvictedOneLearnsOfTheUpdate) {
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  ASSERT_EQ(registry_.Evict([] { return false; }), 1);
+  clock_.Advance(2 * SessionTable::kInUse);
+  ASSERT_EQ(registry_.table().Evict([] { return false; }), 1);
   EXPECT_FALSE(first_->updated());
   ASSERT_THAT(Update("", Soften).get(), IsOk());
   EXPECT_TRUE(first_->updated());
-  EXPECT_EQ(registry_.size(), 1);
+  EXPECT_EQ(registry_.table().size(), 1);
 }
 
 TEST_F(SessionUpdateTest, AnOpenerWhoCameBeforeTheUpdateGetsTheUpdatedSession) {
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  ASSERT_EQ(registry_.Evict([] { return false; }), 1);
+  clock_.Advance(2 * SessionTable::kInUse);
+  ASSERT_EQ(registry_.table().Evict([] { return false; }), 1);
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   // In this order on the worker: the update's work, then the restore of the record before it.
@@ -225,13 +224,13 @@ TEST_F(SessionUpdateTest, AnOpenerWhoCameBeforeTheUpdateGetsTheUpdatedSession) {
   pool_->Post(Lane::kStore, [&asked] { asked.set_value(); });
   asked.get_future().wait();
   std::promise<Opened> opened;
-  registry_.Open("a", std::make_shared<std::atomic<bool>>(),
-                 [&opened](Opened session) { opened.set_value(std::move(session)); });
+  registry_.loader().Open("a", std::make_shared<std::atomic<bool>>(),
+                          [&opened](Opened session) { opened.set_value(std::move(session)); });
   std::promise<void> read;
   pool_->Post(Lane::kStore, [&read] { read.set_value(); });
   read.get_future().wait();
   go.set_value();
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, updated.get());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, updated.get());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, opened.get_future().get());
   EXPECT_EQ(session, view.session);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_ + session->bytes_held());
@@ -242,11 +241,11 @@ TEST_F(SessionUpdateTest, WhatIsDeletedMeanwhileStaysDeleted) {
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   std::future<Updated> updated = Update("", Soften);
   std::promise<absl::Status> deleted;
-  registry_.Delete("a", [&](absl::Status status) { deleted.set_value(std::move(status)); });
+  registry_.sync().Delete("a", [&](absl::Status status) { deleted.set_value(std::move(status)); });
   EXPECT_THAT(deleted.get_future().get(), IsOk());
   go.set_value();
   EXPECT_THAT(updated.get(), StatusIs(absl::StatusCode::kNotFound));
-  EXPECT_EQ(registry_.size(), 0);
+  EXPECT_EQ(registry_.table().size(), 0);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
 }
 
