@@ -4,6 +4,7 @@
 // Sessions that are updated (server/session/session_registry.h).
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <future>
 #include <memory>
@@ -35,6 +36,28 @@ using testing::Store;
 
 using Opened = absl::StatusOr<std::shared_ptr<Session>>;
 using Updated = absl::StatusOr<SessionView>;
+
+// Lets a test do something in the middle of a write.
+class WatchedStore : public InMemorySessionStore {
+ public:
+  void Get(const std::string& id, RecordCallback done) override {
+    ++reads;
+    InMemorySessionStore::Get(id, std::move(done));
+  }
+  void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
+    if (before_update) before_update();
+    InMemorySessionStore::Update(std::move(record), epoch, std::move(done));
+  }
+  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
+                   StatusCallback done) override {
+    if (before_commit) std::exchange(before_commit, nullptr)();
+    InMemorySessionStore::CommitPoses(id, std::move(poses), epoch, std::move(done));
+  }
+
+  std::atomic<int> reads = 0;
+  std::function<void()> before_update;
+  std::function<void()> before_commit;
+};
 
 class SessionUpdateTest : public ::testing::Test {
  protected:
@@ -79,11 +102,15 @@ class SessionUpdateTest : public ::testing::Test {
     return promise->get_future();
   }
 
-  absl::Status Commit(const std::shared_ptr<Session>& session, const HandlePose& pose) {
-    std::promise<absl::Status> done;
+  std::future<absl::Status> StartCommit(const std::shared_ptr<Session>& session,
+                                        const HandlePose& pose) {
+    auto done = std::make_shared<std::promise<absl::Status>>();
     registry_.sync().CommitPoses(
-        session, {pose}, [&done](absl::Status status) { done.set_value(std::move(status)); });
-    return done.get_future().get();
+        session, {pose}, [done](absl::Status status) { done->set_value(std::move(status)); });
+    return done->get_future();
+  }
+  absl::Status Commit(const std::shared_ptr<Session>& session, const HandlePose& pose) {
+    return StartCommit(session, pose).get();
   }
 
   static void Soften(SessionRecord* record) { record->stiffness = 500.0; }
@@ -98,7 +125,7 @@ class SessionUpdateTest : public ::testing::Test {
   ServiceLimits limits_;
   MemoryBudget budget_{64 << 20};
   MeshCatalog catalog_{limits_, &budget_, nullptr, &clock_};
-  InMemorySessionStore store_;
+  WatchedStore store_;
   std::unique_ptr<WorkerPool> pool_ = std::make_unique<WorkerPool>(1);
   SessionRegistry registry_{limits_, &budget_, pool_.get(), &store_, &catalog_, &clock_};
   std::shared_ptr<const StoredMesh> bar_;
@@ -191,6 +218,37 @@ TEST_F(SessionUpdateTest, PosesThatAreCommittedWhileItIsPreparedAreKept) {
   // A stream that has not noticed yet; its poses still fit.
   EXPECT_THAT(Commit(first_, Moved(8)), IsOk());
   EXPECT_EQ(Record().last_poses[0].translation_mm.x(), 8);
+}
+
+TEST_F(SessionUpdateTest, AnUpdateDoesNotReadBeforeTheStoreHasACommitThatCameFirst) {
+  std::future<Updated> updated;
+  store_.before_commit = [&] {
+    updated = Update("", Soften);
+    // The update has read the record, to change it. If it did not wait for this commit, it would
+    // read it once more well within this time; a slow machine does not fail the test.
+    const int reads = store_.reads;
+    EXPECT_EQ(updated.wait_for(std::chrono::milliseconds(100)), std::future_status::timeout);
+    EXPECT_EQ(store_.reads, reads);
+  };
+  EXPECT_THAT(Commit(first_, Moved(7)), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, updated.get());
+  ASSERT_EQ(view.record.last_poses.size(), 1U);
+  EXPECT_EQ(view.record.last_poses[0].translation_mm.x(), 7);
+}
+
+TEST_F(SessionUpdateTest, ACommitInTheMiddleOfAnUpdateComesAfterIt) {
+  std::future<absl::Status> committed;
+  store_.before_update = [&] {
+    committed = StartCommit(first_, Moved(7));
+    EXPECT_EQ(committed.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  };
+  ASSERT_THAT(Update("", Soften).get(), IsOk());
+  EXPECT_THAT(committed.get(), IsOk());
+  ASSERT_EQ(Record().last_poses.size(), 1U);
+  EXPECT_EQ(Record().last_poses[0].translation_mm.x(), 7);
+  ASSERT_THAT(Update("", Rename).get(), IsOk());
+  EXPECT_TRUE(HasReason(committed.get(), ErrorReason::kSessionUpdated));
+  EXPECT_TRUE(Record().last_poses.empty()) << "they are of handles that are gone";
 }
 
 TEST_F(SessionUpdateTest, OtherHandlesBeginAtRestAndTakeNoPosesOfTheOldOnes) {
