@@ -158,7 +158,6 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       pool_(std::make_unique<WorkerPool>(options.workers)),
       registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_,
                 Clock::System(), cluster_ == nullptr ? nullptr : &cluster_->node()),
-      reclaimer_(options.limits, &budget_, &registry_, &catalog_),
       housekeeping_(
           {.retention_days = options.limits.retention_days,
            .export_retention_days = options.exports.retention_days,
@@ -167,6 +166,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
           stores_.get(), &registry_, &catalog_),
       streams_(options.limits.max_streams),
       watches_(options.limits, pool_.get()),
+      reclaimer_(options.limits, &budget_, &registry_, &catalog_),
       mesh_service_(&gate_, options.limits, &access_changes_, &catalog_, &uploads_, &registry_,
                     pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &access_, &catalog_, &registry_),

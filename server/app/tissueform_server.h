@@ -146,10 +146,10 @@ class TissueformServer {
   MeshUploads uploads_;
   std::unique_ptr<WorkerPool> pool_;
   SessionRegistry registry_;
-  MemoryReclaimer reclaimer_;
   Housekeeping housekeeping_;
   DeformStreams streams_;
   SessionWatches watches_;
+  MemoryReclaimer reclaimer_;  // sessions that it evicts tell streams and watches
   DeadlineTimer timer_;
   MeshService mesh_service_;
   SessionService session_service_;

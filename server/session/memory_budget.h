@@ -48,7 +48,7 @@ class MemoryReservation {
 // How much memory meshes and sessions may hold together, and those of one owner. What does not fit
 // is refused before it is allocated.
 //
-// The budget knows nobody who could free memory. One thread may ask it which reservations do not
+// The budget calls nothing that could free memory. One thread may ask it which reservations do not
 // fit (WaitForShortage), free memory, and say so (AnswerShortage); while it does, such a
 // reservation blocks until its answer and is then tried once more.
 //
@@ -77,7 +77,7 @@ class MemoryBudget {
   // REQUIRES: called before the first reservation.
   void set_account_limit(int64_t bytes) { account_limit_bytes_ = bytes; }
   // Where this owner's reservations are made; lives as long as this one. This one itself where
-  // owners have no limit, and for nobody (an empty name).
+  // owners have no limit, and for an empty name.
   MemoryBudget* AccountOf(const std::string& owner);
 
   // `what` is said in the message ("mesh", "matrix factor").
@@ -103,7 +103,7 @@ class MemoryBudget {
   absl::Status Refusal(int64_t bytes, absl::string_view what) const;
   absl::Status Take(int64_t bytes, absl::string_view what);
   bool TryTake(int64_t bytes);
-  // Of the whole. Returns when the shortage is answered, at once where nobody reclaims.
+  // Of the whole. Returns when the shortage is answered, at once if memory is not reclaimed.
   void ReportShortage(const Shortage& shortage) ABSL_LOCKS_EXCLUDED(mutex_);
   void GiveBack(int64_t bytes);
   void GiveBackHere(int64_t bytes);  // not to the whole

@@ -45,7 +45,7 @@ void MemoryReclaimer::ReclaimOf(const std::string& owner, int64_t bytes) {
 
 void MemoryReclaimer::Reclaim(int64_t bytes) {
   const int64_t limit = budget_->limit_bytes();
-  // Down to the low watermark, so that the next who needs room finds some.
+  // Down to the low watermark, so that the next reservation finds room.
   const auto low = static_cast<int64_t>(kLowWatermark * static_cast<double>(limit));
   const auto fits = [this, bytes](int64_t watermark) {
     return budget_->reserved_bytes() <= watermark - bytes;

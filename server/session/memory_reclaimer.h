@@ -15,7 +15,7 @@
 namespace tissueform {
 
 // Frees memory for reservations that do not fit into the budget, on a thread of its own, as long as
-// it lives: sessions and meshes that nobody uses leave memory.
+// it lives: sessions and meshes that are not in use leave memory.
 class MemoryReclaimer {
  public:
   // All pointers must outlive it.

@@ -138,7 +138,7 @@ std::optional<SessionLoader::Arrival> SessionLoader::JoinEarlierRequest(const Re
     return Arrival{.found = {.refusal = OtherRequest(request_id)}};
   }
   const auto flight = flights_.find(earlier->session_id);
-  // Also where all who waited have canceled: FinishCreation makes it again if it stops for that.
+  // Also if all its callers have canceled: FinishCreation starts it again if it stops for that.
   if (flight != flights_.end() && flight->second->creates()) return Join(flight->second, waiter);
   Waiter claimant = waiter;
   claimant.claims = true;
@@ -224,7 +224,7 @@ void SessionLoader::FinishCreation(const FlightPtr& flight,
   bool again = false;
   {
     MutexLock lock(mutex_);
-    // All who waited had canceled, and then somebody came.
+    // All callers had canceled, and then another one joined.
     again = absl::IsCancelled(made.status()) && flight->wanted();
     if (!again) {
       waiters = EndFlight(flight);
@@ -245,7 +245,7 @@ void SessionLoader::FinishLoading(const FlightPtr& flight,
   SessionTable::Found found;
   {
     MutexLock lock(mutex_);
-    // Only of those who are answered: who canceled while it was loaded has no claim.
+    // Only of callers that are answered: one that canceled has no claim.
     const auto claims = std::count_if(flight->waiters.begin(), flight->waiters.end(),
                                       [](const Waiter& waiter) { return waiter.claims; });
     found = table_->FinishLoading(flight->id, made, flight->wanted(), static_cast<int>(claims));
@@ -349,7 +349,7 @@ void SessionLoader::Keep(SessionView made, const SessionCallback& done) {
 void SessionLoader::Remake(const std::string& id, const Change& change, const Caller& caller,
                            const ViewCallback& done) {
   caller.Tell(SessionStage::kReadingMesh);
-  // Before the record is read: nobody else writes it from then on.
+  // Before the record is read: no other server writes it from then on.
   leases_->Take(id, [this, id, change, caller, done](absl::StatusOr<SessionLeaseHandlePtr> hold) {
     if (!hold.ok()) {
       done(hold.status());

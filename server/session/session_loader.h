@@ -31,8 +31,8 @@
 
 namespace tissueform {
 
-// Creates sessions on the workers, and loads them again from their records: each once for all who
-// wait for it (single flight), on a preparation that they share.
+// Creates sessions on the workers, and loads them again from their records: each once for all its
+// callers (single flight), on a preparation that sessions share.
 //
 // Thread-safe. Its lock comes before that of the table, and is held over no other call. Callbacks
 // come once, without a lock, from the calling thread, a worker or a thread of the store.
@@ -55,12 +55,12 @@ class SessionLoader {
   }
 
   // Makes a session of `record` on a worker, keeps the record and calls `done` once. A record
-  // without id gets a random one. Calls with the same request id share one session; its making
-  // stops early when `cancelled` is set for all who wait for it. `mesh` is the one that the record
-  // names. `tell` hears how far it is, also who joins later.
+  // without id gets a random one. Calls with the same request id share one session; its creation
+  // stops early when `cancelled` is set for all its callers. `mesh` is the one that the record
+  // names. `tell` gets the progress, also of a creation that was begun for another caller.
   //
   // Every successful answer is a claim on the session, see StoreSync::Abandon. A session whose
-  // lease is not to be had is there all the same, but CheckHeld refuses it.
+  // lease cannot be taken is created, too, but CheckHeld refuses it.
   //
   // Errors: those of Session::Create, SessionTable::BeginCreation and SessionStore::Create;
   // InvalidArgument (the request id belongs to another request); Cancelled.
@@ -81,7 +81,7 @@ class SessionLoader {
   // that of the version that is changed; empty: any. `done` gets the session when its new record is
   // durable as far as the store is; after an error it is as it was.
   //
-  // Errors: NotFound; Aborted (another version, or somebody else was faster); those of Open, of
+  // Errors: NotFound; Aborted (another version, or another update was faster); those of Open, of
   // `change` and of SessionStore::Update.
   using Change =
       std::function<absl::StatusOr<SessionRecord>(SessionRecord record, const StoredMesh& mesh)>;
@@ -89,20 +89,20 @@ class SessionLoader {
   void Update(const std::string& id, const std::string& etag, const Change& change,
               CancelFlag cancelled, const ViewCallback& done, TellSession tell = {});
 
-  // Answers those callers of Create and Open at once with Cancelled who came with this flag and
-  // still wait; what is made for nobody else stops at its next stage.
+  // Answers the callers of Create and Open that gave this flag and still wait: Cancelled. What is
+  // made for no other caller stops at its next stage.
   void CancelWait(const CancelFlag& cancelled) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // This server may not answer the session: who waits for it to be loaded gets SESSION_MOVED, and
-  // need not wait for a store that may be away.
+  // This server may not answer the session: callers that wait for it to be loaded get
+  // SESSION_MOVED, and need not wait for a store that may be away.
   void Lost(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // Nothing is posted to the pool any longer: what the store answers from now on finds nobody who
-  // waits. Call it before the pool ends, and end the store's calls before this.
+  // Nothing is posted to the pool any longer. Call it before the pool ends, and end the store's
+  // calls before this.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  // Somebody who waits for a session.
+  // A caller that waits for a session.
   struct Waiter {
     CancelFlag cancelled;
     SessionCallback done;
@@ -120,7 +120,7 @@ class SessionLoader {
     std::optional<SessionProgress> newest = std::nullopt;
 
     bool creates() const { return mesh != nullptr; }
-    // Whether somebody waits for it who has not canceled.
+    // Whether a caller waits for it that has not canceled.
     bool wanted() const;
   };
   using FlightPtr = std::shared_ptr<Flight>;
@@ -160,7 +160,7 @@ class SessionLoader {
       ABSL_LOCKS_EXCLUDED(mutex_);
   void FinishLoading(const FlightPtr& flight, absl::StatusOr<std::shared_ptr<Session>> made)
       ABSL_LOCKS_EXCLUDED(mutex_);
-  // All who wait for it, at any time.
+  // All callers that wait for it at the time.
   Caller CallerOf(const FlightPtr& flight) ABSL_LOCKS_EXCLUDED(mutex_);
   std::vector<Waiter> EndFlight(const FlightPtr& flight) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
@@ -172,7 +172,7 @@ class SessionLoader {
   // made. Errors: those of SessionStore::Create.
   void Keep(SessionView made, const SessionCallback& done);
   // Takes the session of a record in the store, and makes it of what `change` leaves. After an
-  // error it is given back, if nobody else here holds it.
+  // error it is given back, unless this server holds it otherwise.
   void Remake(const std::string& id, const Change& change, const Caller& caller,
               const ViewCallback& done);
   void MakeChanged(const SessionRecord& record, const Change& change, Caller caller,
@@ -193,7 +193,7 @@ class SessionLoader {
   SessionTable* const table_;
   StoreSync* const sync_;
   const Clock* const clock_;
-  std::function<absl::Status(const absl::Status&)> naming_room_;  // empty: nobody else has any
+  std::function<absl::Status(const absl::Status&)> naming_room_;  // empty: no other server has any
 
   // Self-synchronised.
   SharedPreparations preparations_;

@@ -24,8 +24,8 @@ namespace tissueform {
 // are in memory. One that was not used for a while leaves memory when room is needed (it is
 // evicted) and is loaded again from its record when it is opened.
 //
-// Joins the four parts, each with a lock of its own: the loader uses the store sync, both use the
-// table, and all use the leases; no arrow points up. Thread-safe.
+// Joins the four parts, each with its own lock: the loader uses the store sync, both use the table,
+// and all use the leases. None uses one above it. Callers use the parts directly. Thread-safe.
 class SessionRegistry {
  public:
   // All pointers must outlive the registry and all its sessions. `ownership` says which sessions of

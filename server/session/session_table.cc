@@ -84,7 +84,7 @@ int SessionTable::Evict(const std::function<bool()>& enough,
     const std::shared_ptr<Session> evicted = EvictOldest(owner);
     if (evicted == nullptr) break;
     observer_(evicted->id(), SessionEvent::kEvicted);
-    // Here and now, whoever still holds it: nothing is being solved in a session not in use.
+    // At once, although streams may hold it: nothing is solved in a session that is not in use.
     evicted->Close(Session::CloseReason::kEvicted);
     ++count;
   }
@@ -92,8 +92,8 @@ int SessionTable::Evict(const std::function<bool()>& enough,
   return count;
 }
 
-// A session that is being loaded is not in the table yet, so it cannot be evicted before those who
-// wait for it have it; and its place counts, so it finds room.
+// A session that is being loaded is not in the table yet, so it cannot be evicted before its
+// callers have it. Its place counts, so it finds room.
 std::shared_ptr<Session> SessionTable::EvictOldest(const std::optional<std::string>& owner) {
   MutexLock lock(mutex_);
   Entry* oldest = LeastRecentlyUsed(clock_->Now() - kInUse, owner);
@@ -152,7 +152,7 @@ bool SessionTable::MakeRoom() {
 // The mesh leaves between two sections under the lock. BeginCreation reads leaving_meshes_ and
 // gives the place under the same lock: so either this counts the place, or the creation is refused.
 absl::Status SessionTable::RemoveMesh(const std::string& sha256) {
-  // Sessions in memory keep what nobody could read again.
+  // Sessions in memory keep their meshes, which could not be read again.
   if (!catalog_->keeps_meshes()) return catalog_->Remove(sha256);
   {
     MutexLock lock(mutex_);
@@ -368,7 +368,8 @@ absl::Status SessionTable::Replace(const SessionView& updated, bool other_handle
     entry->mesh.reset();
     ++entry->version;
     if (before != nullptr) entry->evicted.push_back(before);
-    // Who opens it from now on gets the new one; who holds another has to know why.
+    // Callers that open it from now on get the new one; streams that hold an earlier one have to
+    // know why it closes.
     for (const std::weak_ptr<Session>& earlier : entry->evicted) {
       if (const std::shared_ptr<Session> held = earlier.lock()) held->MarkUpdated(other_handles);
     }

@@ -27,8 +27,8 @@
 
 namespace tissueform {
 
-// What happens to a session, for those who follow it without using it.
-// kMoved: this server holds it no longer.
+// What happens to a session, for streams and watches that follow it.
+// kMoved: this server does not hold it any longer.
 enum class SessionEvent { kEvicted, kRestored, kDeleted, kMoved };
 // From any thread, without a lock held.
 using SessionObserver = std::function<void(const std::string& id, SessionEvent event)>;
@@ -49,8 +49,8 @@ struct SessionView {
 };
 
 // The state of every session that this server knows, by its id, and how sessions leave memory
-// (eviction). It knows nothing of who waits for a session (SessionLoader) and writes no record
-// (StoreSync).
+// (eviction). It does not know which calls wait for a session (SessionLoader), and does not write
+// records (StoreSync).
 //
 // An id is free, has a place (its session is being created), has an entry (the record is kept; the
 // session is in memory or not), has both (it is being loaded), or is ending (the record is about to
@@ -61,8 +61,8 @@ struct SessionView {
 // Session::Close.
 class SessionTable {
  public:
-  // What was used within this time is not evicted: a server that would take sessions from those who
-  // work with them refuses instead.
+  // A session that was used within this time is not evicted. A server whose sessions are all in use
+  // refuses new ones.
   static constexpr std::chrono::seconds kInUse{10};
 
   // All pointers must outlive it.
@@ -106,7 +106,7 @@ class SessionTable {
   int Evict(const std::function<bool()>& enough, const std::optional<std::string>& owner = {});
   // What Evict would give back at most.
   int64_t EvictableBytes() const;
-  // Evicts until there is room for one more session; false when there is no room all the same.
+  // Evicts until there is room for one more session; false when there is still no room.
   bool MakeRoom();
 
   // Takes the mesh out of the catalog, where that can have it again for no session: while it goes
@@ -135,14 +135,13 @@ class SessionTable {
     std::shared_ptr<Session> lost = nullptr;     // give it to CloseLost without a lock
     bool loads_again = false;                    // of FinishLoading: it has kept its place
   };
-  // Neither a refusal nor a session: it has a place, the caller's or an earlier one. `claims`: who
-  // asks counts as one more claim where the session is in memory. Refusals: NotFound,
-  // ResourceExhausted.
+  // Neither a refusal nor a session: it has a place, the caller's or an earlier one. `claims`: the
+  // caller is one more claim if the session is in memory. Refusals: NotFound, ResourceExhausted.
   Found BeginLoading(const std::string& id, bool claims);
-  // Ends the loading of a session, which got so many new claims. The callers get what is found; if
-  // that is not what was loaded, nobody needs that. It is loaded again after an update, and when it
-  // was canceled though a caller still waits (`wanted`). Refusals: that of `loaded`; NotFound (it
-  // was deleted); SESSION_MOVED.
+  // Ends the loading of a session, which gets so many new claims. The callers get what is found; if
+  // that is not what was loaded, the loaded session is not needed. It is loaded again after an
+  // update, and when it was canceled though a caller still waits (`wanted`). Refusals: that of
+  // `loaded`; NotFound (it was deleted); SESSION_MOVED.
   Found FinishLoading(const std::string& id, const absl::StatusOr<std::shared_ptr<Session>>& loaded,
                       bool wanted, int claims);
   void CloseLost(const std::shared_ptr<Session>& lost) const;
@@ -159,8 +158,8 @@ class SessionTable {
   };
   std::optional<EarlierRequest> FindRequest(const std::string& request_id) const;
 
-  // For StoreSync. Whoever takes a session out ends it and its record; until Ended its id is not
-  // free.
+  // For StoreSync, which ends the sessions that it takes out, and their records. Until Ended the id
+  // is not free.
   struct TakenSession {
     std::shared_ptr<Session> session;        // null: it was not in memory
     std::shared_ptr<const StoredMesh> mesh;  // goes without a lock
@@ -193,10 +192,10 @@ class SessionTable {
   struct Entry {
     std::shared_ptr<Session> session;  // null: it is in the store only
     RequestKey key;
-    std::string owner;  // empty: nobody with a name
+    std::string owner;  // empty: anonymous
     std::string mesh_sha256;
     int version = 0;                                   // how often it was updated
-    int claims = 1;                                    // who has seen its name
+    int claims = 1;                                    // callers that know its name
     Clock::TimePoint last_used = {};                   // while there is no session
     std::vector<std::weak_ptr<Session>> evicted = {};  // earlier ones; their holders open it again
     std::shared_ptr<const StoredMesh> mesh = {};  // while there is no session: cannot be read again

@@ -33,7 +33,7 @@ bool SameHandleNames(const std::vector<HandleRegion>& a, const std::vector<Handl
                     [](const HandleRegion& x, const HandleRegion& y) { return x.name == y.name; });
 }
 
-// Where nobody waits for the end of a session.
+// Of a session whose end no caller waits for.
 void WarnIfLeftBehind(const absl::Status& status) {
   if (!status.ok()) spdlog::warn("a session's record remains: {}", status.ToString());
 }
@@ -299,8 +299,8 @@ void StoreSync::Erase(const std::string& id, const SessionLeaseHandlePtr& hold,
 void StoreSync::OnErased(const std::string& id, const SessionLeaseHandlePtr& hold,
                          const absl::Status& outcome, const StatusCallback& done) {
   const absl::Status status = hold == nullptr ? outcome : MovedIfFenced(outcome);
-  // Only now: who comes to watch after it does not find the record any longer. If the record of a
-  // shared store is still there, the next who asks for the session finds it.
+  // Only now: a watch that is opened after it does not find the record any longer. If the record of
+  // a shared store is still there, the next call for the session finds it.
   const bool is_kept = hold != nullptr && !status.ok() && !absl::IsNotFound(status);
   table_->Notify(id, is_kept ? SessionEvent::kMoved : SessionEvent::kDeleted);
   // Before its id is free: the lease of this one says nothing of the next.

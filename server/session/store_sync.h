@@ -76,8 +76,8 @@ class StoreSync {
   void WaitForCommits(const std::string& id, std::chrono::steady_clock::time_point deadline)
       ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // Keeps the record of an updated session if nobody was faster, and puts the session into the
-  // table. Committed poses stay where the handles' names and their order do. After an error the
+  // Keeps the record of an updated session if no other update was faster, and puts the session into
+  // the table. Committed poses stay where the handles' names and their order do. After an error the
   // updated session is gone before `done` comes.
   //
   // Errors: NotFound, those of SessionStore::Update, SESSION_MOVED.
@@ -89,11 +89,11 @@ class StoreSync {
   // Takes back one claim of a caller who never saw the answer of SessionLoader::Create. The session
   // ends with its last claim.
   void Abandon(const std::shared_ptr<Session>& session);
-  // Ends a session that is out of the table, and its record; nobody waits for that.
+  // Ends a session that is out of the table, and its record; no caller waits for that.
   void EndUnwanted(const std::shared_ptr<Session>& session);
 
   // Ends the sessions that were idle for longer than the TTL, records and all: for stores in
-  // memory, whose meshes nobody else keeps. Returns how many.
+  // memory, whose meshes are kept nowhere else. Returns how many.
   int RemoveIdle();
   // Ends those of the sessions that were not used since, and that no stream holds, records and all.
   // Returns how many. Blocks where the store is shared; what others hold there stays.
