@@ -79,41 +79,42 @@ MemoryBudget* MemoryBudget::AccountOf(const std::string& owner) {
 }
 
 absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
-  bool taken = TryTake(bytes);
-  // Once more and no oftener: all that can be spared was given back, and another may have taken it.
-  if (!taken) {
-    (whole_ == nullptr ? this : whole_)->ReportShortage({owner_, bytes});
-    taken = TryTake(bytes);
-  }
-  if (!taken) return Refusal(bytes, what);
+  // Once more and no oftener: all that can be spared was given back.
+  MemoryBudget* const whole = whole_ == nullptr ? this : whole_;
+  if (!TryTake(bytes) && !whole->TakeReclaimed(this, bytes)) return Refusal(bytes, what);
   if (whole_ == nullptr) return absl::OkStatus();
   const absl::Status of_whole = whole_->Take(bytes, what);
   if (!of_whole.ok()) GiveBackHere(bytes);
   return of_whole;
 }
 
-void MemoryBudget::ReportShortage(const Shortage& shortage) {
+bool MemoryBudget::TakeReclaimed(MemoryBudget* budget, int64_t bytes) {
   MutexLock lock(mutex_);
-  if (!reclaims_) return;
-  shortages_.push_back(shortage);
-  const int64_t number = ++num_reported_;
-  reported_or_answered_.NotifyAll();
-  while (num_answered_ < number) reported_or_answered_.Wait(mutex_);
+  if (!reclaims_) return false;
+  Waiting waiting = {.budget = budget, .bytes = bytes};
+  waiting_.push_back(&waiting);
+  asked_or_answered_.NotifyAll();
+  while (!waiting.is_answered) asked_or_answered_.Wait(mutex_);
+  return waiting.is_taken;
 }
 
 std::optional<MemoryBudget::Shortage> MemoryBudget::WaitForShortage() {
   MutexLock lock(mutex_);
-  while (reclaims_ && shortages_.empty()) reported_or_answered_.Wait(mutex_);
+  while (reclaims_ && waiting_.empty()) asked_or_answered_.Wait(mutex_);
   if (!reclaims_) return std::nullopt;
-  Shortage oldest = std::move(shortages_.front());
-  shortages_.pop_front();
-  return oldest;
+  const Waiting& oldest = *waiting_.front();
+  return Shortage{oldest.budget->owner_, oldest.bytes};
 }
 
 void MemoryBudget::AnswerShortage() {
   MutexLock lock(mutex_);
-  num_answered_ = std::min(num_answered_ + 1, num_reported_);
-  reported_or_answered_.NotifyAll();
+  if (waiting_.empty()) return;  // reclaiming has ended
+  Waiting& oldest = *waiting_.front();
+  waiting_.pop_front();
+  oldest.is_answered = true;
+  oldest.is_taken =
+      oldest.budget == this ? TryTakeLocked(oldest.bytes) : oldest.budget->TryTake(oldest.bytes);
+  asked_or_answered_.NotifyAll();
 }
 
 void MemoryBudget::BeginReclaiming() {
@@ -124,9 +125,9 @@ void MemoryBudget::BeginReclaiming() {
 void MemoryBudget::EndReclaiming() {
   MutexLock lock(mutex_);
   reclaims_ = false;
-  shortages_.clear();
-  num_answered_ = num_reported_;
-  reported_or_answered_.NotifyAll();
+  for (Waiting* waiting : waiting_) waiting->is_answered = true;
+  waiting_.clear();
+  asked_or_answered_.NotifyAll();
 }
 
 absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const {
@@ -155,6 +156,10 @@ absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const 
 
 bool MemoryBudget::TryTake(int64_t bytes) {
   MutexLock lock(mutex_);
+  return TryTakeLocked(bytes);
+}
+
+bool MemoryBudget::TryTakeLocked(int64_t bytes) {
   // A difference, because the sum of what is asked and what is taken might overflow.
   if (bytes > limit_bytes_ - reserved_bytes_) {
     return false;

@@ -49,8 +49,8 @@ class MemoryReservation {
 // is refused before it is allocated.
 //
 // The budget calls nothing that could free memory. One thread may ask it which reservations do not
-// fit (WaitForShortage), free memory, and say so (AnswerShortage); while it does, such a
-// reservation blocks until its answer and is then tried once more.
+// fit (WaitForShortage), free memory, and say so (AnswerShortage). While it does, such a
+// reservation blocks until its answer, and is then made if it fits.
 //
 // Thread-safe. Its locks are held over nothing else.
 class MemoryBudget {
@@ -70,7 +70,8 @@ class MemoryBudget {
   void EndReclaiming() ABSL_LOCKS_EXCLUDED(mutex_);
   // The oldest one; blocks until there is one. Empty after EndReclaiming.
   std::optional<Shortage> WaitForShortage() ABSL_LOCKS_EXCLUDED(mutex_);
-  // What could be given back was.
+  // What could be given back for the oldest one was. It is made at once, if it fits: the next one
+  // does not get the same room.
   void AnswerShortage() ABSL_LOCKS_EXCLUDED(mutex_);
 
   // What one owner may have: AccountOf then gives budgets of their own, parts of this one.
@@ -103,8 +104,10 @@ class MemoryBudget {
   absl::Status Refusal(int64_t bytes, absl::string_view what) const;
   absl::Status Take(int64_t bytes, absl::string_view what);
   bool TryTake(int64_t bytes);
-  // Of the whole. Returns when the shortage is answered, at once if memory is not reclaimed.
-  void ReportShortage(const Shortage& shortage) ABSL_LOCKS_EXCLUDED(mutex_);
+  bool TryTakeLocked(int64_t bytes) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Of the whole: waits for the answer to a shortage of `budget`, which is an account or this one.
+  // False at once if memory is not reclaimed.
+  bool TakeReclaimed(MemoryBudget* budget, int64_t bytes) ABSL_LOCKS_EXCLUDED(mutex_);
   void GiveBack(int64_t bytes);
   void GiveBackHere(int64_t bytes);  // not to the whole
 
@@ -121,12 +124,16 @@ class MemoryBudget {
   int64_t reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
   int64_t most_reserved_bytes_ ABSL_GUARDED_BY(mutex_) = 0;
 
-  // Of the whole. Shortages are answered in the order of their reports.
-  ConditionVariable reported_or_answered_;
+  // Of the whole, whose lock comes before those of the accounts.
+  struct Waiting {
+    MemoryBudget* budget = nullptr;
+    int64_t bytes = 0;
+    bool is_answered = false;
+    bool is_taken = false;
+  };
+  ConditionVariable asked_or_answered_;
   bool reclaims_ ABSL_GUARDED_BY(mutex_) = false;
-  std::deque<Shortage> shortages_ ABSL_GUARDED_BY(mutex_);
-  int64_t num_reported_ ABSL_GUARDED_BY(mutex_) = 0;
-  int64_t num_answered_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::deque<Waiting*> waiting_ ABSL_GUARDED_BY(mutex_);  // the oldest first
 };
 
 }  // namespace tissueform

@@ -21,7 +21,7 @@ class MemoryReclaimer {
   // All pointers must outlive it.
   MemoryReclaimer(const ServiceLimits& limits, MemoryBudget* budget, SessionRegistry* registry,
                   MeshCatalog* catalog);
-  // Reservations that wait are tried once more.
+  // Reservations that wait are refused.
   ~MemoryReclaimer();
   MemoryReclaimer(const MemoryReclaimer&) = delete;
   MemoryReclaimer& operator=(const MemoryReclaimer&) = delete;

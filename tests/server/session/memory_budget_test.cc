@@ -116,7 +116,27 @@ TEST(MemoryBudgetTest, ReclaimingMakesRoomForOneMoreTry) {
   EXPECT_EQ(budget.reserved_bytes(), 90);
 }
 
-TEST(MemoryBudgetTest, AReservationThatWaitsIsTriedAgainWhenNobodyReclaimsAnyMore) {
+TEST(MemoryBudgetTest, ReservationsThatAreShortAtTheSameTimeDoNotGetTheSameRoom) {
+  MemoryBudget budget(100);
+  std::vector<MemoryReservation> idle;
+  idle.push_back(*budget.Reserve(50, "idle"));
+  idle.push_back(*budget.Reserve(50, "idle"));
+  budget.BeginReclaiming();
+  const auto reserve = [&] { return budget.Reserve(50, "fresh"); };
+  auto first = std::async(std::launch::async, reserve);
+  auto second = std::async(std::launch::async, reserve);
+  for (int shortage = 0; shortage < 2; ++shortage) {
+    const int64_t bytes = budget.WaitForShortage()->bytes;
+    // No more than is needed.
+    while (!idle.empty() && budget.reserved_bytes() + bytes > budget.limit_bytes()) idle.pop_back();
+    budget.AnswerShortage();
+  }
+  EXPECT_THAT(first.get(), IsOk());
+  EXPECT_THAT(second.get(), IsOk());
+  budget.EndReclaiming();
+}
+
+TEST(MemoryBudgetTest, AReservationThatWaitsIsRefusedWhenReclaimingEnds) {
   MemoryBudget budget(100);
   budget.BeginReclaiming();
   std::future<bool> reserved =
