@@ -16,7 +16,7 @@ namespace tissueform {
 std::unique_ptr<Stores> WatchStores(std::unique_ptr<Stores> stores, AccessChanges* changes);
 
 // Tells `changes` of the predictions and cases that are kept. (Sessions are told by who learns what
-// is known, SessionRegistry::LearnKnown.) Blocks. Errors: those of the stores.
+// is known, StoreSync::LearnAll.) Blocks. Errors: those of the stores.
 absl::Status NotifyExisting(Stores* stores, AccessChanges* changes);
 
 }  // namespace tissueform

@@ -45,10 +45,6 @@ constexpr std::chrono::milliseconds kLastMessagesGrace{500};
 // Proxies ask for the health every second; who is sent here meanwhile is served as ever.
 constexpr std::chrono::seconds kUntilProxiesSee{3};
 
-// Of the memory budget: how far sessions that are not in use are evicted once something does not
-// fit. The high watermark is the budget itself.
-constexpr double kLowWatermark = 0.8;
-
 void PrepareProcessOnce() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -85,11 +81,6 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
           .port = options.port,
           .most = std::min(options.max_connections, descriptors),
           .most_of_address = options.max_connections_per_address};
-}
-
-SessionOwnership* OwnershipOf(Cluster* cluster) {
-  if (cluster == nullptr) return SoleOwnership::Get();
-  return &cluster->node();
 }
 
 }  // namespace
@@ -133,7 +124,7 @@ absl::Status TissueformServer::LoadIndex() {
     return access_.KnowsPrediction(id) ||
            !absl::IsNotFound(stores_->predictions().Get(id).status());
   }));
-  TF_RETURN_IF_ERROR(registry_.LearnKnown());
+  TF_RETURN_IF_ERROR(registry_.sync().LearnAll());
   return absl::OkStatus();
 }
 
@@ -166,7 +157,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       uploads_(options.limits, &catalog_, &stores_->uploads()),
       pool_(std::make_unique<WorkerPool>(options.workers)),
       registry_(options.limits, &budget_, pool_.get(), &stores_->sessions(), &catalog_,
-                Clock::System(), OwnershipOf(cluster_.get())),
+                Clock::System(), cluster_ == nullptr ? nullptr : &cluster_->node()),
       housekeeping_(
           {.retention_days = options.limits.retention_days,
            .export_retention_days = options.exports.retention_days,
@@ -175,6 +166,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
           stores_.get(), &registry_, &catalog_),
       streams_(options.limits.max_streams),
       watches_(options.limits, pool_.get()),
+      reclaimer_(options.limits, &budget_, &registry_, &catalog_),
       mesh_service_(&gate_, options.limits, &access_changes_, &catalog_, &uploads_, &registry_,
                     pool_.get(), &timer_),
       session_service_(&gate_, options.limits, &access_, &catalog_, &registry_),
@@ -189,7 +181,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
                       &export_watches_, pool_.get(), &timer_),
       server_info_service_(&gate_, LimitsOf(options)) {
   SetBlasThreads(1);  // the pool's workers share the cores already
-  registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
+  registry_.table().set_observer([this](const std::string& id, SessionEvent event) {
     telemetry_->session_events().Count(event);
     streams_.OnSessionEvent(id, event);
     watches_.OnSessionEvent(id, event);
@@ -199,13 +191,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
   exports_.set_on_changed(
       [this](const ExportRecord& record) { export_watches_.OnChanged(record); });
   access_.set_most_bytes(options.quotas.disk_bytes);
-  registry_.set_most_of_owner(options.quotas.sessions);
-  budget_.set_account_limit(MemoryQuota(options), [this](const std::string& owner, int64_t bytes) {
-    ReclaimOf(owner, bytes);
-  });
-  // The one circle of callbacks: sessions and meshes that leave return their memory to the budget
-  // that asks for it. It asks without a lock held.
-  budget_.set_reclaimer([this](int64_t bytes) { Reclaim(bytes); });
+  registry_.table().set_max_of_owner(options.quotas.sessions);
+  budget_.set_account_limit(MemoryQuota(options));
   if (cluster_ != nullptr) {
     cluster_->Join({.access = &access_changes_,
                     .sessions = &registry_,
@@ -321,35 +308,9 @@ bool TissueformServer::is_exposed() const {
   return !IsLoopback(options_.host) && !(options_.tls.enabled() && tokens_ != nullptr);
 }
 
-void TissueformServer::ReclaimOf(const std::string& owner, int64_t bytes) {
-  const MemoryBudget* account = budget_.AccountOf(owner);
-  registry_.Evict([&] { return bytes <= account->limit_bytes() - account->reserved_bytes(); },
-                  owner);
-}
-
-void TissueformServer::Reclaim(int64_t bytes) {
-  // Down to the low watermark, so that the next who needs room finds some.
-  const auto low =
-      static_cast<int64_t>(kLowWatermark * static_cast<double>(options_.memory_budget_bytes));
-  const auto most = [this, bytes](int64_t watermark) {
-    return budget_.reserved_bytes() <= watermark - bytes;
-  };
-  const auto enough = [&] { return most(low); };
-  registry_.Evict(enough);
-  // Afterwards: a mesh is idle only when no session holds it.
-  int meshes = 0;
-  if (catalog_.keeps_meshes()) {
-    if (!enough()) meshes = catalog_.RemoveIdle(SessionRegistry::kInUse);
-  } else if (!most(options_.memory_budget_bytes)) {
-    registry_.RemoveIdle();
-    meshes = catalog_.RemoveIdle(options_.limits.session_idle_ttl);
-  }
-  if (meshes > 0) spdlog::info("{} unused meshes were evicted from memory", meshes);
-}
-
 int64_t TissueformServer::FreeBytes() const {
   const int64_t reserved = budget_.reserved_bytes();
-  return budget_.limit_bytes() - reserved + registry_.EvictableBytes();
+  return budget_.limit_bytes() - reserved + registry_.table().EvictableBytes();
 }
 
 void TissueformServer::Ask(std::function<void()> answered) {

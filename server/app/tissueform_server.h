@@ -40,6 +40,7 @@
 #include "server/session/deadline_timer.h"
 #include "server/session/housekeeping.h"
 #include "server/session/memory_budget.h"
+#include "server/session/memory_reclaimer.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/mesh_uploads.h"
 #include "server/session/session_registry.h"
@@ -117,8 +118,6 @@ class TissueformServer {
   absl::Status Listen();
   // What sessions may still take, where those that nobody uses leave for it.
   int64_t FreeBytes() const;
-  void Reclaim(int64_t bytes);
-  void ReclaimOf(const std::string& owner, int64_t bytes);
   // Nothing is told without --metrics-port.
   absl::Status ServeMetrics();
   SecurityReadings ReadSecurity() const;
@@ -150,6 +149,7 @@ class TissueformServer {
   Housekeeping housekeeping_;
   DeformStreams streams_;
   SessionWatches watches_;
+  MemoryReclaimer reclaimer_;  // sessions that it evicts tell streams and watches
   DeadlineTimer timer_;
   MeshService mesh_service_;
   SessionService session_service_;

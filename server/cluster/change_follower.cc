@@ -125,12 +125,12 @@ absl::Status ChangeFollower::LookAtSession(const std::string& id) {
   const absl::StatusOr<SessionRecord> record = GetRecord(rooms_.stores->sessions(), id);
   if (record.ok()) {
     rooms_.access->Added(*record);
-    rooms_.sessions->Changed(*record);
+    rooms_.sessions->sync().OnChanged(*record);
     return absl::OkStatus();
   }
   if (!absl::IsNotFound(record.status())) return record.status();
   rooms_.access->SessionGone(id);
-  rooms_.sessions->Forget(id);
+  rooms_.sessions->sync().OnDeleted(id);
   return absl::OkStatus();
 }
 
@@ -187,13 +187,13 @@ absl::Status ChangeFollower::LookAtAllSessions(const std::vector<std::string>& k
     for (const SessionRecord& record : page.records) {
       gone.erase(record.id);
       rooms_.access->Added(record);
-      rooms_.sessions->Changed(record);
+      rooms_.sessions->sync().OnChanged(record);
     }
     request.after = std::move(page.next);
   } while (!request.after.empty());
   for (const std::string& id : gone) {
     rooms_.access->SessionGone(id);
-    rooms_.sessions->Forget(id);
+    rooms_.sessions->sync().OnDeleted(id);
   }
   return absl::OkStatus();
 }

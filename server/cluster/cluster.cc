@@ -54,7 +54,7 @@ void Cluster::Join(ClusterListeners rooms, Access* access) {
       [this](const std::string& id, const std::function<absl::Status()>& read) {
         return lookups_.ReadForExport(id, read);
       });
-  rooms.sessions->set_naming_room(
+  rooms.sessions->loader().set_naming_room(
       [this](const absl::Status& refusal) { return node_.NamingRoom(refusal); });
   node_.set_on_lost([sessions = rooms.sessions](const std::string& id) { sessions->Lost(id); });
 }

@@ -15,7 +15,7 @@
 #include "server/cluster/cluster_options.h"
 #include "server/cluster/counted_leases.h"
 #include "server/cluster/node_table.h"
-#include "server/session/session_ownership.h"
+#include "server/session/session_lease_table.h"
 #include "server/store/postgres_store/lease_keeper.h"
 #include "server/store/postgres_store/postgres_pool.h"
 #include "server/store/postgres_store/postgres_session_leases.h"
@@ -49,7 +49,6 @@ class ClusterNode final : public SessionOwnership {
   int64_t lost() const { return lost_; }
   int held() { return keeper_.CountHeld(); }
 
-  bool is_shared() const override { return true; }
   absl::StatusOr<int64_t> Acquire(const std::string& id) override;
   std::optional<int64_t> EpochOf(const std::string& id) override { return keeper_.EpochOf(id); }
   void Forget(const std::string& id) override { keeper_.Forget(id); }

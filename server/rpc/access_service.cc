@@ -223,7 +223,7 @@ std::map<std::string, v1::PrincipalUsage> AccessService::CollectUsage() const {
     usage[owner].set_stored_sessions(held.sessions);
     usage[owner].set_disk_bytes(held.bytes);
   }
-  for (const std::shared_ptr<Session>& session : registry_->Loaded()) {
+  for (const std::shared_ptr<Session>& session : registry_->table().Loaded()) {
     v1::PrincipalUsage& of_owner = usage[changes_->access().OwnerOf(session->id())];
     of_owner.set_sessions(of_owner.sessions() + 1);
     of_owner.set_memory_bytes(of_owner.memory_bytes() + session->bytes_held());

@@ -78,7 +78,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
 
   void OnCancel() override {
     *cancelled_ = true;
-    registry_->CancelWait(cancelled_);
+    registry_->loader().CancelWait(cancelled_);
   }
 
  private:

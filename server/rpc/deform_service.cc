@@ -48,7 +48,7 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
 
   void OnCancel() override {
     *cancelled_ = true;
-    registry_->CancelWait(cancelled_);
+    registry_->loader().CancelWait(cancelled_);
   }
 
   void OnDone() override { delete this; }

@@ -34,11 +34,11 @@ DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& l
       commits_(
           [registry](std::shared_ptr<const Session> session, std::vector<HandlePose> poses,
                      StreamCommits::Outcome done) {
-            registry->pool().Post(
-                Lane::kFrames, [registry, session = std::move(session), poses = std::move(poses),
-                                done = std::move(done)]() mutable {
-                  registry->CommitPoses(std::move(session), std::move(poses), std::move(done));
-                });
+            registry->pool().Post(Lane::kFrames, [registry, session = std::move(session),
+                                                  poses = std::move(poses),
+                                                  done = std::move(done)]() mutable {
+              registry->sync().CommitPoses(std::move(session), std::move(poses), std::move(done));
+            });
           },
           [this](uint64_t sequence, const absl::Status& outcome) {
             FinishCommit(sequence, outcome);
@@ -98,7 +98,7 @@ void DeformStreamReactor::OnCancel() {
 
 void DeformStreamReactor::StopWaiting() {
   *cancelled_ = true;
-  registry_->CancelWait(cancelled_);
+  registry_->loader().CancelWait(cancelled_);
 }
 
 absl::Status DeformStreamReactor::CheckAuthorization() {
@@ -215,9 +215,10 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
 void DeformStreamReactor::StartOpening() {
   flow_->StartPreparation();
   registry_->pool().Post(Lane::kFrames, [this, id = opening_.request().session_id] {
-    registry_->Open(id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-      TakeSession(std::move(session));
-    });
+    registry_->loader().Open(id, cancelled_,
+                             [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+                               TakeSession(std::move(session));
+                             });
   });
 }
 

@@ -13,7 +13,7 @@
 
 #include "core/base/mutex.h"
 #include "server/session/frame_scheduler.h"
-#include "server/session/session_evictor.h"
+#include "server/session/session_table.h"
 
 namespace tissueform {
 

@@ -178,7 +178,7 @@ absl::Status MeshService::RemoveMesh(CallScope* scope, const v1::DeleteMeshReque
   // A prediction may hold the name of one that has gone.
   TF_RETURN_IF_ERROR(catalog_->Look(sha256).status());
   TF_RETURN_IF_ERROR(access.CheckMeshAccess(caller, sha256, Permission::kOwner));
-  if (!access.OthersHoldMesh(caller, sha256)) return registry_->RemoveMesh(sha256);
+  if (!access.OthersHoldMesh(caller, sha256)) return registry_->table().RemoveMesh(sha256);
   const int sessions = access.CountSessionsOf(caller, sha256);
   return sessions > 0 ? MeshInUse(sessions) : changes_->ReleaseMesh(caller, sha256);
 }

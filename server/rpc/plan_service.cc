@@ -67,21 +67,23 @@ class FitCall : public grpc::ServerUnaryReactor {
       TF_ASSIGN_OR_RETURN(const std::string id,
                           AllowedSession(access, &scope_, request_.session(), Permission::kWrite));
       TF_ASSIGN_OR_RETURN(wanted_, ToFitRequest(request_));
-      registry_->Open(id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-        if (!session.ok()) {
-          End(session.status());
-          return;
-        }
-        session_ = *std::move(session);
-        session_->pool().Post(Lane::kSolves, [this] { EndUnlessOk([this] { return Resolve(); }); });
-      });
+      registry_->loader().Open(
+          id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+            if (!session.ok()) {
+              End(session.status());
+              return;
+            }
+            session_ = *std::move(session);
+            session_->pool().Post(Lane::kSolves,
+                                  [this] { EndUnlessOk([this] { return Resolve(); }); });
+          });
       return absl::OkStatus();
     });
   }
 
   void OnCancel() override {
     *cancelled_ = true;
-    registry_->CancelWait(cancelled_);
+    registry_->loader().CancelWait(cancelled_);
   }
 
   void OnDone() override { delete this; }

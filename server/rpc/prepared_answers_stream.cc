@@ -55,16 +55,17 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
         return absl::InvalidArgumentError("`prepared` is missing; set it as for the stream");
       }
       TF_ASSIGN_OR_RETURN(wanted_, ReadStreamRequest(ConfigurationOf(request_), limits_));
-      registry_->Open(id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-        EndUnlessOk([&] { return Choose(std::move(session)); });
-      });
+      registry_->loader().Open(id, cancelled_,
+                               [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+                                 EndUnlessOk([&] { return Choose(std::move(session)); });
+                               });
       return absl::OkStatus();
     });
   }
 
   void OnCancel() override {
     *cancelled_ = true;
-    registry_->CancelWait(cancelled_);
+    registry_->loader().CancelWait(cancelled_);
   }
 
  private:

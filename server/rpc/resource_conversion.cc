@@ -139,7 +139,7 @@ absl::StatusOr<PageRequest> ReadPageRequest(int32_t page_size, const std::string
                      .after = page_token};
 }
 
-v1::Session ToProto(const SessionRegistry::View& view) {
+v1::Session ToProto(const SessionView& view) {
   const SessionRecord& record = view.record;
   v1::Session proto;
   proto.set_name(SessionName(record.id));

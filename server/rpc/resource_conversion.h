@@ -35,7 +35,7 @@ absl::Status CheckNamesSomething(const v1::UpdateSessionRequest& request);
 absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& request,
                                               SessionRecord record, const StoredMesh& mesh,
                                               const ServiceLimits& limits);
-v1::Session ToProto(const SessionRegistry::View& view);
+v1::Session ToProto(const SessionView& view);
 
 // Which part of a list is asked for.
 struct PageRequest {

@@ -83,7 +83,7 @@ absl::Status SessionPreparation::Make(const Principal& caller,
   if (*cancelled_) return absl::OkStatus();
   TF_ASSIGN_OR_RETURN(SessionRecord record,
                       ToSessionRecord(request_.create(), *mesh, caller, limits_));
-  registry_->Create(
+  registry_->loader().Create(
       std::move(record), mesh, cancelled_,
       [self = shared_from_this()](const absl::StatusOr<std::shared_ptr<Session>>& session) {
         if (session.ok()) {
@@ -99,13 +99,13 @@ absl::Status SessionPreparation::Make(const Principal& caller,
 absl::Status SessionPreparation::BeginUpdate() {
   TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request_.update().name()));
   TF_RETURN_IF_ERROR(CheckNamesSomething(request_.update()));
-  registry_->Update(
+  registry_->loader().Update(
       id, request_.update().etag(),
       [self = shared_from_this()](SessionRecord record, const StoredMesh& mesh) {
         return ToUpdatedRecord(self->request_.update(), std::move(record), mesh, self->limits_);
       },
       cancelled_,
-      [self = shared_from_this()](const absl::StatusOr<SessionRegistry::View>& view) {
+      [self = shared_from_this()](const absl::StatusOr<SessionView>& view) {
         if (view.ok()) {
           self->TakeSession(view->session, /*claimed=*/nullptr);
         } else {
@@ -118,7 +118,7 @@ absl::Status SessionPreparation::BeginUpdate() {
 
 absl::Status SessionPreparation::BeginOpening() {
   TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(request_.open()));
-  registry_->Open(
+  registry_->loader().Open(
       id, cancelled_,
       [self = shared_from_this()](const absl::StatusOr<std::shared_ptr<Session>>& session) {
         if (session.ok()) {
@@ -186,8 +186,8 @@ void SessionPreparation::MakeAnswers(const StreamConfiguration& configuration,
 
 void SessionPreparation::Describe(const std::shared_ptr<Session>& session,
                                   const std::shared_ptr<Session>& claimed) {
-  registry_->Look(session->id(), [self = shared_from_this(),
-                                  claimed](const absl::StatusOr<SessionRegistry::View>& view) {
+  registry_->sync().Look(session->id(), [self = shared_from_this(),
+                                         claimed](const absl::StatusOr<SessionView>& view) {
     self->Finish(view.ok() ? absl::StatusOr<v1::Session>(ToProto(*view)) : view.status(), claimed);
   });
 }
@@ -201,13 +201,13 @@ void SessionPreparation::Finish(absl::StatusOr<v1::Session> result,
     // Where nobody is told its name it is not kept.
     if (done && result.ok()) claimed_ = std::exchange(claimed, nullptr);
   }
-  if (claimed != nullptr) registry_->Abandon(claimed);
+  if (claimed != nullptr) registry_->sync().Abandon(claimed);
   if (done) done(std::move(result));
 }
 
 void SessionPreparation::Cancel() {
   *cancelled_ = true;
-  registry_->CancelWait(cancelled_);
+  registry_->loader().CancelWait(cancelled_);
   Finish(absl::CancelledError("the client canceled the call"));
 }
 
@@ -217,7 +217,7 @@ void SessionPreparation::EndOfCall() {
     MutexLock lock(mutex_);
     std::swap(claimed, claimed_);
   }
-  if (*cancelled_ && claimed != nullptr) registry_->Abandon(claimed);
+  if (*cancelled_ && claimed != nullptr) registry_->sync().Abandon(claimed);
 }
 
 }  // namespace tissueform

@@ -46,7 +46,7 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   // Once. `admission` is why the call is not served (see Authorise), or OK; `caller` whose session
   // it will be.
   //
-  // Errors: InvalidArgument (the request), those of MeshCatalog::Load, SessionRegistry::Create,
+  // Errors: InvalidArgument (the request), those of MeshCatalog::Load, SessionLoader::Create,
   // Update, Open and Look, and of PrepareAnswers; Cancelled.
   void Start(const absl::Status& admission, const Principal& caller);
 

@@ -72,7 +72,7 @@ grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext
       [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string id,
                             AllowedSession(access_, &scope, request->name(), Permission::kRead));
-        registry_->Look(id, [end, response](const absl::StatusOr<SessionRegistry::View>& view) {
+        registry_->sync().Look(id, [end, response](const absl::StatusOr<SessionView>& view) {
           if (view.ok()) *response = ToProto(*view);
           end(view.status());
         });
@@ -88,19 +88,19 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
       [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const PageRequest page,
                             ReadPageRequest(request->page_size(), request->page_token()));
-        registry_->List({.owner = scope.principal().name,
-                         .also = access_.SharedSessions(scope.principal()),
-                         .after = page.after,
-                         .limit = page.size},
-                        [end, response](const absl::StatusOr<SessionRegistry::ViewPage>& views) {
-                          if (views.ok()) {
-                            for (const SessionRegistry::View& view : views->views) {
-                              *response->add_sessions() = ToProto(view);
-                            }
-                            response->set_next_page_token(views->next);
-                          }
-                          end(views.status());
-                        });
+        registry_->sync().List({.owner = scope.principal().name,
+                                .also = access_.SharedSessions(scope.principal()),
+                                .after = page.after,
+                                .limit = page.size},
+                               [end, response](const absl::StatusOr<SessionViewPage>& views) {
+                                 if (views.ok()) {
+                                   for (const SessionView& view : views->views) {
+                                     *response->add_sessions() = ToProto(view);
+                                   }
+                                   response->set_next_page_token(views->next);
+                                 }
+                                 end(views.status());
+                               });
         return absl::OkStatus();
       });
 }
@@ -132,7 +132,7 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
       [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string id,
                             AllowedSession(access_, &scope, request->name(), Permission::kOwner));
-        registry_->Delete(id, end);
+        registry_->sync().Delete(id, end);
         return absl::OkStatus();
       });
 }

@@ -19,7 +19,7 @@ absl::Status ClientHasCancelled() { return absl::CancelledError("the client canc
 // Lives as long as one of its jobs waits or runs.
 class Search : public std::enable_shared_from_this<Search> {
  public:
-  Search(AnswerQuestion question, SessionRegistry::CancelFlag cancelled, CheckSession check,
+  Search(AnswerQuestion question, SessionLoader::CancelFlag cancelled, CheckSession check,
          AnswerCallback done)
       : question_(std::move(question)),
         cancelled_(std::move(cancelled)),
@@ -32,12 +32,13 @@ class Search : public std::enable_shared_from_this<Search> {
       done_(id.status());
       return;
     }
-    registry->Open(*id, cancelled_,
-                   [self = shared_from_this()](absl::StatusOr<std::shared_ptr<Session>> session) {
-                     const absl::Status status =
-                         session.ok() ? self->TakeSession(*std::move(session)) : session.status();
-                     if (!status.ok()) self->done_(status);
-                   });
+    registry->loader().Open(
+        *id, cancelled_,
+        [self = shared_from_this()](absl::StatusOr<std::shared_ptr<Session>> session) {
+          const absl::Status status =
+              session.ok() ? self->TakeSession(*std::move(session)) : session.status();
+          if (!status.ok()) self->done_(status);
+        });
   }
 
  private:
@@ -90,7 +91,7 @@ class Search : public std::enable_shared_from_this<Search> {
   }
 
   const AnswerQuestion question_;
-  const SessionRegistry::CancelFlag cancelled_;
+  const SessionLoader::CancelFlag cancelled_;
   const CheckSession check_;
   const AnswerCallback done_;
   const Cancellation cancellation_{[flag = cancelled_] { return flag->load(); }};
@@ -100,7 +101,7 @@ class Search : public std::enable_shared_from_this<Search> {
 }  // namespace
 
 void FindSingleAnswer(SessionRegistry* registry, AnswerQuestion question,
-                      SessionRegistry::CancelFlag cancelled, CheckSession check,
+                      SessionLoader::CancelFlag cancelled, CheckSession check,
                       AnswerCallback done) {
   std::make_shared<Search>(std::move(question), std::move(cancelled), std::move(check),
                            std::move(done))

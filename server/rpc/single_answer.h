@@ -42,12 +42,11 @@ using AnswerCallback = std::function<void(absl::StatusOr<SingleAnswer> answer)>;
 // Opens the session, checks the question and `check` (empty: nothing) against it, makes the model
 // ready and solves. `done` is called once: from here, or from a worker, with an answer on the
 // session's strand. It stops early once `cancelled` is set; then also call
-// registry->CancelWait(cancelled). `registry` must outlive the call.
+// registry->loader().CancelWait(cancelled). `registry` must outlive the call.
 //
-// Errors: InvalidArgument (the question); those of `check`, SessionRegistry::Open,
+// Errors: InvalidArgument (the question); those of `check`, SessionLoader::Open,
 // Session::PrepareModel and Session::Solve; Cancelled.
 void FindSingleAnswer(SessionRegistry* registry, AnswerQuestion question,
-                      SessionRegistry::CancelFlag cancelled, CheckSession check,
-                      AnswerCallback done);
+                      SessionLoader::CancelFlag cancelled, CheckSession check, AnswerCallback done);
 
 }  // namespace tissueform

@@ -96,10 +96,10 @@ void WatchStreamReactor::OnSendInitialMetadataDone(bool ok) {
     return;
   }
   registry_->pool().Post(Lane::kFrames, [this] {
-    registry_->Open(session_id_, cancelled_,
-                    [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-                      TakeSession(std::move(session));
-                    });
+    registry_->loader().Open(session_id_, cancelled_,
+                             [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+                               TakeSession(std::move(session));
+                             });
   });
 }
 
@@ -122,7 +122,7 @@ void WatchStreamReactor::Join(const std::shared_ptr<Session>& session) {
     return;
   }
   channel_ = std::move(joined->channel);
-  registry_->Look(session_id_, [this, session](absl::StatusOr<SessionRegistry::View> view) {
+  registry_->sync().Look(session_id_, [this, session](absl::StatusOr<SessionView> view) {
     if (!view.ok()) {
       FinishOpening(view.status());
       return;
@@ -168,7 +168,7 @@ void WatchStreamReactor::OnWriteDone(bool ok) {
 
 void WatchStreamReactor::OnCancel() {
   *cancelled_ = true;
-  registry_->CancelWait(cancelled_);
+  registry_->loader().CancelWait(cancelled_);
   MutexLock lock(mutex_);
   End(absl::CancelledError("the client ended the watch"));
   Advance();
@@ -209,7 +209,7 @@ void WatchStreamReactor::RecheckAuthorization() {
   }
   // As in OnCancel, with the outcome that is there already.
   *cancelled_ = true;
-  registry_->CancelWait(cancelled_);
+  registry_->loader().CancelWait(cancelled_);
   MutexLock lock(mutex_);
   Advance();
 }

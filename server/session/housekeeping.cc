@@ -126,7 +126,7 @@ bool Housekeeping::WriteUse() {
   const bool set_forward = offset_s > offset_s_ + kSetForwardSeconds;
   const Clock::TimePoint since = set_forward ? started_ : written_until_;
 
-  const SessionRegistry::Use use = registry_->UsedSince(since);
+  const SessionTable::Use use = registry_->table().UsedSince(since);
   std::vector<std::string> meshes = catalog_->UsedSince(since);
   meshes.insert(meshes.end(), use.meshes.begin(), use.meshes.end());
   absl::Status status = stores_->meshes().Touch(meshes, unix_s);
@@ -155,7 +155,7 @@ int Housekeeping::RemoveSessions(int64_t before_s) {
   if (!page.ok()) return 0;
   std::vector<std::string> ids;
   for (const SessionRecord& record : page->records) ids.push_back(record.id);
-  return registry_->RemoveUnused(ids, written_until_);
+  return registry_->sync().RemoveUnused(ids, written_until_);
 }
 
 bool Housekeeping::RemovePredictions(int64_t before_s, Claimed* claimed, int* removed) {
@@ -167,7 +167,7 @@ bool Housekeeping::RemovePredictions(int64_t before_s, Claimed* claimed, int* re
     WarnUnlessOk(page.status(), "old predictions remain");
     if (!page.ok()) return false;
     for (const PredictionRecord& record : page->records) {
-      const bool old = record.created_s < before_s && !registry_->Knows(record.session);
+      const bool old = record.created_s < before_s && !registry_->table().Knows(record.session);
       if (old && *removed < kMaxOfARound && store.Delete(record.id).ok()) {
         ++*removed;
       } else {
@@ -191,7 +191,8 @@ int Housekeeping::RemoveMeshes(int64_t before_s, const std::set<std::string>& of
   std::vector<std::string> of_unknown_age;
   for (const MeshRecord& record : *unused) {
     if (removed == kMaxOfARound) break;
-    if (of_predictions.contains(record.sha256) || registry_->CountMadeFrom(record.sha256) > 0) {
+    if (of_predictions.contains(record.sha256) ||
+        registry_->table().CountMadeFrom(record.sha256) > 0) {
       continue;
     }
     // Servers before this one wrote no time: their meshes count from now on.

@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-// When a session that nobody uses any longer may be evicted (SessionEvictor::kInUse).
+// When a session that nobody uses any longer may be evicted (SessionTable::kInUse).
 constexpr int64_t kSessionsInUseMs = 10'000;
 
 std::string Mebibytes(int64_t bytes) {
@@ -68,35 +68,66 @@ int64_t MemoryBudget::most_reserved_bytes() const {
   return most_reserved_bytes_;
 }
 
-void MemoryBudget::set_account_limit(int64_t bytes, AccountReclaimer reclaimer) {
-  account_limit_bytes_ = bytes;
-  account_reclaimer_ = std::move(reclaimer);
-}
-
 MemoryBudget* MemoryBudget::AccountOf(const std::string& owner) {
   if (owner.empty() || account_limit_bytes_ == 0) return this;
   MutexLock lock(accounts_mutex_);
   std::unique_ptr<MemoryBudget>& account = accounts_[owner];
   if (account == nullptr) {
-    account = absl::WrapUnique(new MemoryBudget(account_limit_bytes_, this));
-    account->set_reclaimer([this, owner](int64_t bytes) { account_reclaimer_(owner, bytes); });
+    account = absl::WrapUnique(new MemoryBudget(account_limit_bytes_, this, owner));
   }
   return account.get();
 }
 
 absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
-  bool taken = TryTake(bytes);
-  // Once more and no oftener: it has given back all that can be spared, and another may have taken
-  // that. No lock is held, since what is reclaimed comes back through GiveBack.
-  if (!taken && reclaimer_) {
-    reclaimer_(bytes);
-    taken = TryTake(bytes);
-  }
-  if (!taken) return Refusal(bytes, what);
+  // Once more and no oftener: all that can be spared was given back.
+  MemoryBudget* const whole = whole_ == nullptr ? this : whole_;
+  if (!TryTake(bytes) && !whole->TakeReclaimed(this, bytes)) return Refusal(bytes, what);
   if (whole_ == nullptr) return absl::OkStatus();
   const absl::Status of_whole = whole_->Take(bytes, what);
   if (!of_whole.ok()) GiveBackHere(bytes);
   return of_whole;
+}
+
+bool MemoryBudget::TakeReclaimed(MemoryBudget* budget, int64_t bytes) {
+  MutexLock lock(mutex_);
+  if (!reclaims_) return false;
+  Waiting waiting = {.budget = budget, .bytes = bytes};
+  waiting_.push_back(&waiting);
+  asked_or_answered_.NotifyAll();
+  while (!waiting.is_answered) asked_or_answered_.Wait(mutex_);
+  return waiting.is_taken;
+}
+
+std::optional<MemoryBudget::Shortage> MemoryBudget::WaitForShortage() {
+  MutexLock lock(mutex_);
+  while (reclaims_ && waiting_.empty()) asked_or_answered_.Wait(mutex_);
+  if (!reclaims_) return std::nullopt;
+  const Waiting& oldest = *waiting_.front();
+  return Shortage{oldest.budget->owner_, oldest.bytes};
+}
+
+void MemoryBudget::AnswerShortage() {
+  MutexLock lock(mutex_);
+  if (waiting_.empty()) return;  // reclaiming has ended
+  Waiting& oldest = *waiting_.front();
+  waiting_.pop_front();
+  oldest.is_answered = true;
+  oldest.is_taken =
+      oldest.budget == this ? TryTakeLocked(oldest.bytes) : oldest.budget->TryTake(oldest.bytes);
+  asked_or_answered_.NotifyAll();
+}
+
+void MemoryBudget::BeginReclaiming() {
+  MutexLock lock(mutex_);
+  reclaims_ = true;
+}
+
+void MemoryBudget::EndReclaiming() {
+  MutexLock lock(mutex_);
+  reclaims_ = false;
+  for (Waiting* waiting : waiting_) waiting->is_answered = true;
+  waiting_.clear();
+  asked_or_answered_.NotifyAll();
 }
 
 absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const {
@@ -125,6 +156,10 @@ absl::Status MemoryBudget::Refusal(int64_t bytes, absl::string_view what) const 
 
 bool MemoryBudget::TryTake(int64_t bytes) {
   MutexLock lock(mutex_);
+  return TryTakeLocked(bytes);
+}
+
+bool MemoryBudget::TryTakeLocked(int64_t bytes) {
   // A difference, because the sum of what is asked and what is taken might overflow.
   if (bytes > limit_bytes_ - reserved_bytes_) {
     return false;

@@ -151,7 +151,7 @@ class Session {
   // solved. Gives the memory back; later calls of Deform fail. What is being made for the session
   // at this moment (see making()) is given back when that ends.
   void Close(CloseReason reason);
-  // Any thread. Closed, but the server still has the session: SessionRegistry::Open gives another.
+  // Any thread. Closed, but the server still has the session: SessionLoader::Open gives another.
   bool evicted() const { return evicted_; }
   // Any thread. Closed, since this server does not hold it any longer.
   bool moved() const { return moved_; }

@@ -53,6 +53,11 @@ absl::Status MovedIfFenced(absl::Status status) {
   return absl::IsFailedPrecondition(status) ? SessionMoved("") : std::move(status);
 }
 
+absl::Status SessionOutdated() {
+  return WithReason(absl::AbortedError("the session has other handles now; open the stream again"),
+                    ErrorReason::kSessionUpdated);
+}
+
 absl::Status MeshInUse(int sessions) {
   return WithReason(absl::FailedPreconditionError(
                         absl::StrCat(sessions, sessions == 1 ? " session is" : " sessions are",

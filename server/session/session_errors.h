@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 
-// What the registry of sessions answers to those whom it does not serve.
+// The errors of calls that use sessions.
 namespace tissueform {
 
 absl::Status NoSuchSession(const std::string& id);         // NotFound
@@ -19,6 +19,7 @@ absl::Status EndingId(const std::string& id);              // Unavailable: it is
 absl::Status SessionMoved(const std::string& node);
 // What the store has said of a write under an epoch: SessionMoved where that is an old one.
 absl::Status MovedIfFenced(absl::Status status);
+absl::Status SessionOutdated();        // Aborted: its handles are others now
 absl::Status MeshInUse(int sessions);  // FailedPrecondition
 absl::Status NoSuchMesh();             // NotFound
 absl::Status NoMeshAnyMore();          // NotFound: it was deleted meanwhile

@@ -15,7 +15,7 @@ absl::Status SessionLeaseHandle::Check() const {
 }
 
 void SessionLeaseTable::Take(const std::string& id, const TakenCallback& done) {
-  if (!shared_) {
+  if (!shared()) {
     done(SessionLeaseHandlePtr());
     return;
   }
@@ -24,7 +24,7 @@ void SessionLeaseTable::Take(const std::string& id, const TakenCallback& done) {
 }
 
 absl::StatusOr<SessionLeaseHandlePtr> SessionLeaseTable::TakeAndWait(const std::string& id) {
-  if (!shared_) return SessionLeaseHandlePtr();
+  if (!shared()) return SessionLeaseHandlePtr();
   if (stops_taking_) return SessionMoved("");
   std::shared_ptr<State> state;
   {
@@ -59,6 +59,7 @@ SessionLeaseHandlePtr SessionLeaseTable::NotHeld(const std::string& id, int64_t 
 }
 
 bool SessionLeaseTable::Holds(const std::string& id) const {
+  if (!shared()) return true;
   {
     MutexLock lock(mutex_);
     const auto found = states_.find(id);
@@ -134,13 +135,14 @@ void SessionLeaseTable::GiveUp(const std::string& id) {
 }
 
 bool SessionLeaseTable::Post(WorkerPool::Job job) {
-  MutexLock lock(pool_mutex_);
+  // Under the lock: after Stop the pool may be gone.
+  MutexLock lock(mutex_);
   if (!stopped_) pool_->Post(Lane::kLeases, std::move(job));
   return !stopped_;
 }
 
 void SessionLeaseTable::Stop() {
-  MutexLock lock(pool_mutex_);
+  MutexLock lock(mutex_);
   stopped_ = true;
 }
 

@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,10 +17,40 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
-#include "server/session/session_ownership.h"
 #include "server/session/worker_pool.h"
 
 namespace tissueform {
+
+// A server that is the only one to write to its store writes under this epoch: a store on disk is
+// locked by it.
+inline constexpr int64_t kSoleEpoch = 1;
+
+// Which sessions of a shared store this server may answer and write. Other servers create, change
+// and delete sessions of that store, too.
+//
+// Thread-safe.
+class SessionOwnership {
+ public:
+  virtual ~SessionOwnership() = default;
+
+  // Takes a session whose record is kept. From then on, until it is lost, this server may answer
+  // and write it, under the epoch that is returned; where it holds the session already the epoch
+  // stays. Blocks on the store.
+  //
+  // Errors: Unavailable with SESSION_MOVED (another server holds it, "node" in the metadata),
+  // NotFound, those of the store.
+  virtual absl::StatusOr<int64_t> Acquire(const std::string& id) = 0;
+
+  // The epoch to write under; none when this server may not answer (any longer). Fast, never
+  // blocks.
+  virtual std::optional<int64_t> EpochOf(const std::string& id) = 0;
+
+  // Its record is gone: nothing is held of it, nor of the next one of its id. Never blocks.
+  virtual void Forget(const std::string& id) = 0;
+
+  // Others may take it at once. Blocks on the store; nothing happens where it is not held.
+  virtual void Release(const std::string& id) = 0;
+};
 
 class SessionLeaseTable;
 
@@ -70,16 +101,19 @@ inline absl::Status CheckHold(const SessionLeaseHandlePtr& hold) {
 // The sessions that this server holds, counted by those who need them; no call that gives one back
 // meets one that takes it.
 //
-// Thread-safe. Made by std::make_shared. What ends a hold may hold any lock but that of the pool.
+// Thread-safe. Made by std::make_shared. Its lock comes after those of all other classes of
+// sessions and before the pool's: a hold may end under any other lock. It is not held over the
+// ownership.
 class SessionLeaseTable : public std::enable_shared_from_this<SessionLeaseTable> {
  public:
   using TakenCallback = std::function<void(absl::StatusOr<SessionLeaseHandlePtr>)>;
 
-  // `ownership` must outlive it and its holds, `pool` until Stop.
+  // `ownership` must outlive it and its holds, `pool` until Stop. Without an `ownership` (null) the
+  // store is this server's own: nothing is taken, and everything is held.
   SessionLeaseTable(SessionOwnership* ownership, WorkerPool* pool)
-      : ownership_(ownership), pool_(pool), shared_(ownership->is_shared()) {}
+      : ownership_(ownership), pool_(pool) {}
 
-  bool shared() const { return shared_; }
+  bool shared() const { return ownership_ != nullptr; }
 
   // Takes a session whose record is kept, where nobody else holds it: at once where the store is
   // not shared, else in Lane::kLeases. Errors: those of SessionOwnership::Acquire; Unavailable (the
@@ -102,7 +136,7 @@ class SessionLeaseTable : public std::enable_shared_from_this<SessionLeaseTable>
   std::vector<std::string> Held() const;
   // From now on this server does not answer the session, though its lease is not given back.
   void GiveUp(const std::string& id);
-  // Its record is gone; never blocks.
+  // Its record is gone; never blocks. REQUIRES: shared, as Release.
   void Forget(const std::string& id) { ownership_->Forget(id); }
   // Gives it back, whoever holds it; blocks.
   void Release(const std::string& id) { ownership_->Release(id); }
@@ -114,20 +148,18 @@ class SessionLeaseTable : public std::enable_shared_from_this<SessionLeaseTable>
   friend class SessionLeaseHandle;
   using State = SessionLeaseHandle::State;
 
-  bool Post(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(pool_mutex_);
+  // False after Stop.
+  bool Post(WorkerPool::Job job) ABSL_LOCKS_EXCLUDED(mutex_);
   void End(const std::string& id, State* state) ABSL_LOCKS_EXCLUDED(mutex_);
   void ReleaseUnlessUsed(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
   void EraseIfIdle(const std::string& id) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   SessionOwnership* const ownership_;
   WorkerPool* const pool_;
-  const bool shared_;
   std::atomic<bool> stops_taking_ = false;
 
-  Mutex pool_mutex_;  // innermost but for the pool's
-  bool stopped_ ABSL_GUARDED_BY(pool_mutex_) = false;
-
   mutable Mutex mutex_;
+  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
   ConditionVariable released_;
   std::map<std::string, std::shared_ptr<State>> states_ ABSL_GUARDED_BY(mutex_);
 };

@@ -4,229 +4,206 @@
 #include "server/session/session_loader.h"
 
 #include <algorithm>
-#include <chrono>
-#include <utility>
-#include <vector>
-
-#include "absl/status/status.h"
+#include <iterator>
 
 #include "core/base/error_reason.h"
-#include "server/session/quotas.h"
+#include "core/base/random_id.h"
+#include "core/base/status_macros.h"
 #include "server/session/session_errors.h"
+#include "server/store/store_errors.h"
 
 namespace tissueform {
 
-SessionLoader::SessionLoader(const ServiceLimits& limits, SharedSessionTable* sessions,
-                             MeshCatalog* catalog, SessionFactory* maker, SessionEvictor* endings,
-                             SessionObserver observer)
-    : limits_(limits),
-      sessions_(sessions),
+SessionLoader::SessionLoader(MemoryBudget* budget, WorkerPool* pool, SessionStore* store,
+                             MeshCatalog* catalog, SessionLeaseTable* leases, SessionTable* table,
+                             StoreSync* sync, const Clock* clock)
+    : budget_(budget),
+      pool_(pool),
+      store_(store),
       catalog_(catalog),
-      maker_(maker),
-      endings_(endings),
-      observer_(std::move(observer)) {}
+      leases_(leases),
+      table_(table),
+      sync_(sync),
+      clock_(clock),
+      preparations_(budget, pool) {}
 
-void SessionLoader::Create(const SessionRecord& record,
-                           const std::shared_ptr<const StoredMesh>& mesh,
-                           const SessionWaiter& waiter) {
+bool SessionLoader::Flight::wanted() const {
+  return std::any_of(waiters.begin(), waiters.end(),
+                     [](const Waiter& waiter) { return !waiter.cancelled->load(); });
+}
+
+SessionLoader::Waiter SessionLoader::MakeWaiter(CancelFlag cancelled, const SessionCallback& done,
+                                                const TellSession& tell) {
+  if (!naming_room_) return {std::move(cancelled), done, tell};
+  return {std::move(cancelled),
+          [this, done](absl::StatusOr<std::shared_ptr<Session>> made) {
+            done(made.ok() ? std::move(made) : naming_room_(made.status()));
+          },
+          tell};
+}
+
+void SessionLoader::Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
+                           CancelFlag cancelled, const SessionCallback& done,
+                           const TellSession& tell) {
+  const Waiter waiter = MakeWaiter(std::move(cancelled), done, tell);
+  if (record.id.empty()) {
+    record.id = RandomId();
+    CreateKnown(std::move(record), mesh, waiter);
+    return;
+  }
+  // The same request may have been made of another server, before anything is prepared for it.
+  const std::string id = record.id;
+  sync_->WhenKnown(
+      id, StoreSync::Patience::kFull,
+      [this, record = std::move(record), mesh, waiter, done](const absl::Status& known) {
+        if (known.ok()) {
+          CreateKnown(record, mesh, waiter);
+        } else {
+          done(known);
+        }
+      });
+}
+
+void SessionLoader::CreateKnown(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
+                                const Waiter& waiter) {
   MakeRoom();
-  Admission admission;
+  Arrival arrival;
   {
-    MutexLock lock(sessions_->mutex);
-    admission = AdmitCreate(record, waiter);
+    MutexLock lock(mutex_);
+    arrival = ArriveToCreate(std::move(record), mesh, waiter);
   }
-  CloseLost(admission.lost);
-  if (admission.started == nullptr) {
-    Answer(admission, waiter);
-  } else if (admission.started->restores) {
-    StartRestore(admission.started);
-  } else {
-    StartCreation(admission.started, record, mesh);
-  }
+  GoOn(arrival, waiter);
 }
 
-void SessionLoader::Open(const std::string& id, const SessionWaiter& waiter) {
-  MakeRoom();
-  Admission admission;
-  {
-    MutexLock lock(sessions_->mutex);
-    admission = AdmitOpen(id, waiter);
+void SessionLoader::Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
+                         const TellSession& tell) {
+  if (absl::StatusOr<std::shared_ptr<Session>> session = table_->Find(id); session.ok()) {
+    done(std::move(session));
+    return;
   }
-  CloseLost(admission.lost);
-  if (admission.started == nullptr) {
-    Answer(admission, waiter);
-  } else {
-    StartRestore(admission.started);
-  }
+  sync_->WhenKnown(id, StoreSync::Patience::kBrief,
+                   [this, id, waiter = MakeWaiter(std::move(cancelled), done, tell),
+                    done](const absl::Status& known) {
+                     if (!known.ok()) {
+                       done(known);
+                       return;
+                     }
+                     MakeRoom();
+                     Arrival arrival;
+                     {
+                       MutexLock lock(mutex_);
+                       arrival = ArriveToOpen(id, waiter);
+                     }
+                     GoOn(arrival, waiter);
+                   });
 }
 
-void SessionLoader::CloseLost(const std::shared_ptr<Session>& lost) {
-  if (lost == nullptr) return;
-  lost->Close(Session::CloseReason::kMoved);
-  observer_(lost->id(), SessionEvent::kMoved);
-}
-
-void SessionLoader::Answer(const Admission& admission, const SessionWaiter& waiter) {
-  if (!admission.refusal.ok()) {
-    waiter.done(admission.refusal);
-  } else if (admission.existing != nullptr) {
-    waiter.done(admission.existing);
-  } else if (admission.joined.has_value() && waiter.tell) {
-    waiter.tell(*admission.joined);
-  }
-}
-
-absl::Status SessionLoader::AdmitRemaking(const std::string& id) {
-  MakeRoom();
-  MutexLock lock(sessions_->mutex);
-  const SessionEntry* known = sessions_->table.Find(id);
-  if (known == nullptr) return NoSuchSession(id);
-  return known->session == nullptr ? CheckRoom() : absl::OkStatus();
-}
-
-// Only now: nothing leaves memory while there is room. Not under the lock, which Evict takes and
-// leaves before sessions end; others may come meanwhile, so whether there is room is asked again.
 void SessionLoader::MakeRoom() {
-  const auto has_room = [this] {
-    MutexLock lock(sessions_->mutex);
-    return !Full();
-  };
-  if (has_room()) return;
-  endings_->Evict(has_room);
-  if (!catalog_->keeps_meshes() && !has_room()) endings_->RemoveIdle();
+  if (!table_->MakeRoom() && !catalog_->keeps_meshes()) sync_->RemoveIdle();
 }
 
-SessionLoader::Admission SessionLoader::AdmitCreate(const SessionRecord& record,
-                                                    const SessionWaiter& waiter) {
-  const RequestKey key = RequestKeyOf(record);
-  Admission admission;
-  if (!key.request_id.empty() && JoinEarlierRequest(key, waiter, &admission)) {
-    return admission;
+SessionLoader::Arrival SessionLoader::ArriveToCreate(SessionRecord record,
+                                                     const std::shared_ptr<const StoredMesh>& mesh,
+                                                     const Waiter& waiter) {
+  if (const RequestKey key = RequestKeyOf(record); !key.request_id.empty()) {
+    if (std::optional<Arrival> joined = JoinEarlierRequest(key, waiter)) return *joined;
   }
-  if (sessions_->table.Find(record.id) != nullptr ||
-      sessions_->table.FindMaking(record.id) != nullptr) {
-    admission.refusal = TakenId(record.id);
-  } else if (sessions_->table.IsEnding(record.id)) {
-    admission.refusal = EndingId(record.id);
-  } else if (sessions_->table.num_known() >= static_cast<size_t>(limits_.max_stored_sessions)) {
-    admission.refusal = TooManySessions(limits_.max_stored_sessions, "keeps",
-                                        "; delete one or raise --max-stored-sessions");
-  } else if (admission.refusal = CheckQuota(record.owner); !admission.refusal.ok()) {
-    // said
-  } else if (admission.refusal = CheckKept(record.mesh_sha256); admission.refusal.ok()) {
-    admission.refusal = CheckRoom();
-  }
-  if (admission.refusal.ok()) {
-    admission.started =
-        sessions_->table.StartMaking(record.id, key, record.owner, record.mesh_sha256,
-                                     /*restores=*/false, waiter);
-  }
-  return admission;
+  Arrival arrival = {.found = {.refusal = table_->BeginCreation(record)}};
+  if (!arrival.found.refusal.ok()) return arrival;
+  const std::string id = record.id;
+  arrival.started = std::make_shared<Flight>(Flight{id, std::move(record), mesh, {waiter}});
+  flights_.emplace(id, arrival.started);
+  return arrival;
 }
 
-SessionLoader::Admission SessionLoader::AdmitOpen(const std::string& id,
-                                                  const SessionWaiter& waiter) {
-  Admission admission;
-  SessionEntry* known = sessions_->table.Find(id);
-  if (known != nullptr && known->session != nullptr && !known->session->CheckHeld().ok()) {
-    admission.lost = std::exchange(known->session, nullptr);
+SessionLoader::Arrival SessionLoader::ArriveToOpen(const std::string& id, const Waiter& waiter) {
+  Arrival arrival = {.found = table_->BeginLoading(id, waiter.claims)};
+  if (!arrival.found.refusal.ok() || arrival.found.session != nullptr) return arrival;
+  if (const auto flight = flights_.find(id); flight != flights_.end()) {
+    Arrival joined = Join(flight->second, waiter);
+    joined.found = std::move(arrival.found);
+    return joined;
   }
-  if (known == nullptr) {
-    admission.refusal = NoSuchSession(id);
-  } else if (known->session != nullptr) {
-    known->session->Touch();
-    admission.existing = known->session;
-  } else if (const PendingSessionPtr making = sessions_->table.FindMaking(id); making != nullptr) {
-    Join(making, waiter, &admission);
-  } else if (admission.refusal = CheckRoom(); admission.refusal.ok()) {
-    admission.started = sessions_->table.StartMaking(id, known->key, known->owner,
-                                                     known->mesh_sha256, /*restores=*/true, waiter);
-    admission.started->version = known->version;
-  }
-  return admission;
+  arrival.started = std::make_shared<Flight>(Flight{id, {}, nullptr, {waiter}});
+  flights_.emplace(id, arrival.started);
+  return arrival;
 }
 
-bool SessionLoader::JoinEarlierRequest(const RequestKey& key, const SessionWaiter& waiter,
-                                       Admission* admission) {
-  SessionEntry* known = sessions_->table.FindRequest(key.request_id);
-  const PendingSessionPtr making =
-      known == nullptr ? sessions_->table.FindMakingOfRequest(key.request_id) : nullptr;
-  if (known == nullptr && making == nullptr) return false;
-  if ((known != nullptr ? known->key : making->key).fingerprint != key.fingerprint) {
-    admission->refusal = OtherRequest(key.request_id.substr(key.request_id.find('\n') + 1));
-  } else if (known != nullptr) {
-    SessionWaiter claimant = waiter;
-    claimant.claims = true;
-    *admission = AdmitOpen(sessions_->table.IdOfRequest(key.request_id), claimant);
-    if (admission->existing != nullptr) ++known->claims;
+std::optional<SessionLoader::Arrival> SessionLoader::JoinEarlierRequest(const RequestKey& key,
+                                                                        const Waiter& waiter) {
+  const auto earlier = table_->FindRequest(key.request_id);
+  if (!earlier.has_value()) return std::nullopt;
+  if (earlier->key.fingerprint != key.fingerprint) {
+    const std::string request_id = key.request_id.substr(key.request_id.find('\n') + 1);
+    return Arrival{.found = {.refusal = OtherRequest(request_id)}};
+  }
+  const auto flight = flights_.find(earlier->session_id);
+  // Also if all its callers have canceled: FinishCreation starts it again if it stops for that.
+  if (flight != flights_.end() && flight->second->creates()) return Join(flight->second, waiter);
+  Waiter claimant = waiter;
+  claimant.claims = true;
+  Arrival arrival = ArriveToOpen(earlier->session_id, claimant);
+  if (HasReason(arrival.found.refusal, ErrorReason::kSessionNotFound)) return std::nullopt;
+  return arrival;
+}
+
+SessionLoader::Arrival SessionLoader::Join(const FlightPtr& flight, const Waiter& waiter) {
+  flight->waiters.push_back(waiter);
+  return {.joined = flight->newest};
+}
+
+void SessionLoader::GoOn(const Arrival& arrival, const Waiter& waiter) {
+  table_->CloseLost(arrival.found.lost);
+  if (!arrival.found.refusal.ok()) {
+    waiter.done(arrival.found.refusal);
+  } else if (arrival.found.session != nullptr) {
+    waiter.done(arrival.found.session);
+  } else if (arrival.started == nullptr) {
+    if (arrival.joined.has_value() && waiter.tell) waiter.tell(*arrival.joined);
+  } else if (arrival.started->creates()) {
+    StartCreation(arrival.started);
   } else {
-    // Also where all who waited have cancelled: FinishCreation makes it again if it stops for that.
-    Join(making, waiter, admission);
+    StartLoading(arrival.started);
   }
-  return true;
 }
 
-void SessionLoader::Join(const PendingSessionPtr& making, const SessionWaiter& waiter,
-                         Admission* admission) {
-  making->waiters.push_back(waiter);
-  admission->joined = making->newest;
+void SessionLoader::StartCreation(const FlightPtr& flight) {
+  Make(flight->record, flight->mesh, CallerOf(flight),
+       [this, flight](absl::StatusOr<SessionView> made) {
+         if (!made.ok()) {
+           FinishCreation(flight, made.status());
+           return;
+         }
+         CallerOf(flight).Tell(SessionStage::kKeeping);
+         Keep(*std::move(made),
+              [this, flight](const absl::StatusOr<std::shared_ptr<Session>>& kept) {
+                FinishCreation(flight, kept);
+              });
+       });
 }
 
-// The caller has found it and holds it, so it leaves the catalog by RemoveMesh only.
-absl::Status SessionLoader::CheckKept(const std::string& mesh_sha256) const {
-  if (!catalog_->keeps_meshes()) return absl::OkStatus();
-  const bool leaves = sessions_->table.IsLeaving(mesh_sha256);
-  return leaves || catalog_->Find(mesh_sha256) == nullptr ? NoMeshAnyMore() : absl::OkStatus();
+void SessionLoader::StartLoading(const FlightPtr& flight) {
+  const auto as_it_is = [](SessionRecord record, const StoredMesh&) { return record; };
+  Remake(flight->id, as_it_is, CallerOf(flight), [this, flight](absl::StatusOr<SessionView> made) {
+    if (made.ok()) {
+      FinishLoading(flight, std::move(made->session));
+    } else {
+      FinishLoading(flight, made.status());
+    }
+  });
 }
 
-absl::Status SessionLoader::CheckQuota(const std::string& owner) const {
-  if (most_of_owner_ == 0 || owner.empty() || sessions_->table.CountOf(owner) < most_of_owner_) {
-    return absl::OkStatus();
-  }
-  constexpr std::chrono::minutes kUntilSomeMayBeGone{1};
-  return QuotaExceeded("sessions", "sessions", most_of_owner_, kUntilSomeMayBeGone);
-}
-
-absl::Status SessionLoader::CheckRoom() const {
-  if (!Full()) return absl::OkStatus();
-  return TooManySessions(
-      limits_.max_sessions, "holds",
-      " in memory, and all are in use; try again in a moment, delete one, or raise "
-      "--max-sessions");
-}
-
-bool SessionLoader::Full() const {
-  return sessions_->table.num_loaded() >= static_cast<size_t>(limits_.max_sessions);
-}
-
-void SessionLoader::StartCreation(const PendingSessionPtr& making, const SessionRecord& record,
-                                  const std::shared_ptr<const StoredMesh>& mesh) {
-  maker_->Create(record, mesh, CallerOf(making),
-                 [this, making, record, mesh](absl::StatusOr<std::shared_ptr<Session>> made) {
-                   if (!FinishCreation(making, std::move(made))) {
-                     StartCreation(making, record, mesh);
-                   }
-                 });
-}
-
-void SessionLoader::StartRestore(const PendingSessionPtr& making) {
-  maker_->Restore(making->id, CallerOf(making),
-                  [this, making](absl::StatusOr<std::shared_ptr<Session>> session) {
-                    FinishRestore(making, std::move(session));
-                  });
-}
-
-SessionCaller SessionLoader::CallerOf(const PendingSessionPtr& making) {
-  return {.cancellation = Cancellation([this, making] {
-            MutexLock lock(sessions_->mutex);
-            return !making->wanted();
+SessionLoader::Caller SessionLoader::CallerOf(const FlightPtr& flight) {
+  return {.cancellation = Cancellation([this, flight] {
+            MutexLock lock(mutex_);
+            return !flight->wanted();
           }),
-          .tell = [this, making](const SessionProgress& progress) {
+          .tell = [this, flight](const SessionProgress& progress) {
             std::vector<TellSession> listening;
             {
-              MutexLock lock(sessions_->mutex);
-              making->newest = progress;
-              for (const SessionWaiter& waiter : making->waiters) {
+              MutexLock lock(mutex_);
+              flight->newest = progress;
+              for (const Waiter& waiter : flight->waiters) {
                 if (waiter.tell) listening.push_back(waiter.tell);
               }
             }
@@ -234,110 +211,250 @@ SessionCaller SessionLoader::CallerOf(const PendingSessionPtr& making) {
           }};
 }
 
-bool SessionLoader::FinishCreation(const PendingSessionPtr& making,
-                                   absl::StatusOr<std::shared_ptr<Session>> result) {
-  std::vector<SessionWaiter> waiters;
-  bool nobody_waits = false;
-  {
-    MutexLock lock(sessions_->mutex);
-    if (absl::IsCancelled(result.status()) && making->wanted()) return false;
-    waiters = sessions_->table.EndMaking(making);
-    nobody_waits = waiters.empty();  // all have cancelled
-    if (result.ok() && nobody_waits) {
-      sessions_->table.TakeUnknown(making->id, making->mesh_sha256);
-    } else if (result.ok()) {
-      SessionEntry known;
-      known.session = *result;
-      known.key = making->key;
-      known.owner = making->owner;
-      known.mesh_sha256 = (*result)->mesh().sha256;
-      known.claims = static_cast<int>(waiters.size());
-      sessions_->table.Add(making->id, std::move(known));
-    }
-  }
-  if (result.ok() && nobody_waits) {
-    endings_->EndUnwanted(*result);
-  }
-  for (const SessionWaiter& waiter : waiters) {
-    waiter.done(result);
-  }
-  return true;
+std::vector<SessionLoader::Waiter> SessionLoader::EndFlight(const FlightPtr& flight) {
+  flights_.erase(flight->id);
+  return std::exchange(flight->waiters, {});
 }
 
-void SessionLoader::FinishRestore(const PendingSessionPtr& making,
-                                  absl::StatusOr<std::shared_ptr<Session>> result) {
-  std::vector<SessionWaiter> waiters;
-  std::shared_ptr<Session> unwanted;
-  std::shared_ptr<Session> lost;
+// The flight ends and the session comes into the table under one lock: a repeated request joins the
+// flight, or finds the session.
+void SessionLoader::FinishCreation(const FlightPtr& flight,
+                                   const absl::StatusOr<std::shared_ptr<Session>>& made) {
+  std::vector<Waiter> waiters;
   bool again = false;
-  if (result.ok()) {
-    if (const absl::Status held = (*result)->CheckHeld(); !held.ok()) {
-      (*result)->Close(Session::CloseReason::kMoved);
-      result = held;
-    }
-  }
   {
-    MutexLock lock(sessions_->mutex);
-    SessionEntry* known = sessions_->table.Find(making->id);
-    if (known != nullptr && known->session != nullptr && !known->session->CheckHeld().ok()) {
-      lost = std::exchange(known->session, nullptr);
-    }
-    if (known != nullptr && known->session != nullptr) {
-      result = known->session;  // an update has made it meanwhile
-    } else if (known != nullptr && known->version != making->version) {
-      // That one has left memory again, and what was made is the session before it.
-      result = absl::CancelledError("the session was updated");
-      making->version = known->version;
-    }
-    // All who waited had cancelled, and then somebody came.
-    again = absl::IsCancelled(result.status()) && known != nullptr && making->wanted();
-    if (!again) waiters = sessions_->table.EndMaking(making);
-    if (result.ok() && known != nullptr) {
-      known->session = *result;
-      known->mesh.reset();
-      // Only now, and only of those who are answered: who cancelled while it was made has none.
-      known->claims += static_cast<int>(
-          std::count_if(waiters.begin(), waiters.end(),
-                        [](const SessionWaiter& waiter) { return waiter.claims; }));
-    } else if (result.ok()) {
-      unwanted = *std::move(result);
-      result = NoSuchSession(making->id);  // deleted meanwhile
+    MutexLock lock(mutex_);
+    // All callers had canceled, and then another one joined.
+    again = absl::IsCancelled(made.status()) && flight->wanted();
+    if (!again) {
+      waiters = EndFlight(flight);
+      table_->FinishCreation(flight->id, made.value_or(nullptr), static_cast<int>(waiters.size()));
     }
   }
-  CloseLost(lost);
   if (again) {
-    StartRestore(making);
+    StartCreation(flight);
     return;
   }
-  if (HasReason(result.status(), ErrorReason::kSessionNotFound)) endings_->Gone(making->id);
-  if (unwanted != nullptr) unwanted->Close(Session::CloseReason::kDeleted);
-  if (result.ok()) observer_(making->id, SessionEvent::kRestored);
-  for (const SessionWaiter& waiter : waiters) {
-    waiter.done(result);
+  if (made.ok() && waiters.empty()) sync_->EndUnwanted(*made);  // all have canceled
+  for (const Waiter& waiter : waiters) waiter.done(made);
+}
+
+void SessionLoader::FinishLoading(const FlightPtr& flight,
+                                  absl::StatusOr<std::shared_ptr<Session>> made) {
+  std::vector<Waiter> waiters;
+  SessionTable::Found found;
+  {
+    MutexLock lock(mutex_);
+    // Only of callers that are answered: one that canceled has no claim.
+    const auto claims = std::count_if(flight->waiters.begin(), flight->waiters.end(),
+                                      [](const Waiter& waiter) { return waiter.claims; });
+    found = table_->FinishLoading(flight->id, made, flight->wanted(), static_cast<int>(claims));
+    if (!found.loads_again) waiters = EndFlight(flight);
+  }
+  table_->CloseLost(found.lost);
+  if (made.ok() && *made != found.session) {
+    (*made)->Close((*made)->CheckHeld().ok() ? Session::CloseReason::kDeleted
+                                             : Session::CloseReason::kMoved);
+    *made = nullptr;  // its memory is free before anybody is answered
+  }
+  if (found.loads_again) {
+    StartLoading(flight);
+    return;
+  }
+  if (HasReason(found.refusal, ErrorReason::kSessionNotFound)) sync_->OnDeleted(flight->id);
+  if (found.refusal.ok()) table_->Notify(flight->id, SessionEvent::kRestored);
+  for (const Waiter& waiter : waiters) {
+    if (found.refusal.ok()) {
+      waiter.done(found.session);
+    } else {
+      waiter.done(found.refusal);
+    }
   }
 }
 
 void SessionLoader::Lost(const std::string& id) {
-  std::vector<SessionWaiter> waiters;
+  std::vector<Waiter> waiters;
   {
-    MutexLock lock(sessions_->mutex);
-    const PendingSessionPtr making = sessions_->table.FindMaking(id);
-    if (making != nullptr && making->restores) waiters = std::exchange(making->waiters, {});
+    MutexLock lock(mutex_);
+    const auto flight = flights_.find(id);
+    if (flight != flights_.end() && !flight->second->creates()) {
+      waiters = std::exchange(flight->second->waiters, {});
+    }
   }
-  for (const SessionWaiter& waiter : waiters) {
-    waiter.done(SessionMoved(""));
+  for (const Waiter& waiter : waiters) waiter.done(SessionMoved(""));
+}
+
+void SessionLoader::CancelWait(const CancelFlag& cancelled) {
+  std::vector<Waiter> gone;
+  {
+    MutexLock lock(mutex_);
+    for (const auto& [id, flight] : flights_) {
+      std::vector<Waiter>& waiters = flight->waiters;
+      const auto first = std::stable_partition(
+          waiters.begin(), waiters.end(),
+          [&cancelled](const Waiter& waiter) { return waiter.cancelled != cancelled; });
+      std::move(first, waiters.end(), std::back_inserter(gone));
+      waiters.erase(first, waiters.end());
+    }
+  }
+  for (const Waiter& waiter : gone) {
+    waiter.done(absl::CancelledError("the client canceled the call"));
   }
 }
 
-void SessionLoader::CancelWait(const SessionWaiter::CancelFlag& cancelled) {
-  std::vector<SessionWaiter> gone;
-  {
-    MutexLock lock(sessions_->mutex);
-    gone = sessions_->table.TakeWaiters(cancelled);
+void SessionLoader::Make(SessionRecord record, std::shared_ptr<const StoredMesh> mesh,
+                         Caller caller, ViewCallback done) {
+  std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
+  Strand& strand = preparation->strand();
+  caller.Tell(SessionStage::kWaiting);
+  // From now on: others may be making what this one needs, too.
+  auto follower = preparation->Follow(record.model, caller.tell);
+  strand.Post(Lane::kBatch, [this, record = std::move(record), mesh = std::move(mesh),
+                             preparation = std::move(preparation), caller = std::move(caller),
+                             follower = std::move(follower), done = std::move(done)]() mutable {
+    caller.Tell(SessionStage::kAssembling);
+    absl::StatusOr<std::shared_ptr<Session>> session =
+        Session::Create(record, std::move(mesh), preparation, budget_->AccountOf(record.owner),
+                        pool_, clock_, caller.cancellation);
+    follower.reset();
+    if (!session.ok()) {
+      preparation.reset();
+      done(session.status());
+      return;
+    }
+    record.node_order = preparation->node_order();
+    preparation.reset();  // else it would outlive what `done` does with the session
+    done(SessionView{std::move(record), *std::move(session)});
+  });
+}
+
+void SessionLoader::Keep(SessionView made, const SessionCallback& done) {
+  store_->Create(std::move(made.record), leases_->shared() ? kFreshEpoch : kSoleEpoch,
+                 [this, session = std::move(made.session),
+                  done](const absl::StatusOr<SessionRecord>& stored) mutable {
+                   if (!stored.ok()) {
+                     session.reset();  // its memory is free before anybody hears of the failure
+                     done(stored.status());
+                     return;
+                   }
+                   const std::string id = session->id();
+                   leases_->Take(id, [this, id, epoch = stored->epoch, session = std::move(session),
+                                      done](absl::StatusOr<SessionLeaseHandlePtr> hold) {
+                     session->SetHold(hold.ok() ? *std::move(hold) : leases_->NotHeld(id, epoch));
+                     done(session);
+                   });
+                 });
+}
+
+void SessionLoader::Remake(const std::string& id, const Change& change, const Caller& caller,
+                           const ViewCallback& done) {
+  caller.Tell(SessionStage::kReadingMesh);
+  // Before the record is read: no other server writes it from then on.
+  leases_->Take(id, [this, id, change, caller, done](absl::StatusOr<SessionLeaseHandlePtr> hold) {
+    if (!hold.ok()) {
+      done(hold.status());
+      return;
+    }
+    const ViewCallback held = WithHold(*std::move(hold), done);
+    store_->Get(id, [this, change, caller, held](absl::StatusOr<SessionRecord> record) {
+      if (!record.ok()) {
+        held(record.status());
+        return;
+      }
+      // Reading a mesh takes its time.
+      const bool posted = PostUnlessStopped([this, record = *std::move(record), change, caller,
+                                             held] { MakeChanged(record, change, caller, held); });
+      if (!posted) held(absl::UnavailableError("the server is ending"));
+    });
+  });
+}
+
+SessionLoader::ViewCallback SessionLoader::WithHold(SessionLeaseHandlePtr hold,
+                                                    const ViewCallback& done) {
+  if (hold == nullptr) return done;
+  // All copies of the callback have one.
+  auto slot = std::make_shared<SessionLeaseHandlePtr>(std::move(hold));
+  return [this, slot = std::move(slot), done](absl::StatusOr<SessionView> made) {
+    if (made.ok()) {
+      made->session->SetHold(std::exchange(*slot, nullptr));
+      done(std::move(made));
+    } else {
+      // A client that is sent to another server finds the session free.
+      leases_->GiveBack(std::exchange(*slot, nullptr),
+                        [done, status = made.status()] { done(status); });
+    }
+  };
+}
+
+void SessionLoader::MakeChanged(const SessionRecord& record, const Change& change, Caller caller,
+                                ViewCallback done) {
+  absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = catalog_->Load(record.mesh_sha256);
+  absl::StatusOr<SessionRecord> changed = mesh.ok() ? change(record, **mesh) : mesh.status();
+  if (!changed.ok()) {
+    done(changed.status());
+    return;
   }
-  for (const SessionWaiter& waiter : gone) {
-    waiter.done(absl::CancelledError("the client canceled the call"));
+  // An order of other free vertices would do, but a worse one than may be found.
+  if (changed->fixed != record.fixed || changed->handles != record.handles) {
+    changed->node_order.clear();
   }
+  Make(*std::move(changed), *std::move(mesh), std::move(caller), std::move(done));
+}
+
+void SessionLoader::Update(const std::string& id, const std::string& etag, const Change& change,
+                           CancelFlag cancelled, const ViewCallback& done, TellSession tell) {
+  const Caller caller{.cancellation = Cancellation(
+                          [cancelled = std::move(cancelled)] { return cancelled->load(); }),
+                      .tell = std::move(tell)};
+  // Before anything is prepared for a change that cannot be kept.
+  const Change checked = [etag, change](SessionRecord record,
+                                        const StoredMesh& mesh) -> absl::StatusOr<SessionRecord> {
+    TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, etag, record.epoch, record.etag, record.epoch));
+    return change(std::move(record), mesh);
+  };
+  const ViewCallback answer = [id, done](absl::StatusOr<SessionView> updated) {
+    if (HasReason(updated.status(), ErrorReason::kSessionNotFound)) updated = NoSuchSession(id);
+    done(std::move(updated));
+  };
+  sync_->WhenKnown(
+      id, StoreSync::Patience::kFull, [this, id, checked, caller, answer](absl::Status refusal) {
+        if (refusal.ok()) MakeRoom();
+        if (refusal.ok()) refusal = table_->CheckUpdate(id);
+        if (!refusal.ok()) {
+          answer(refusal);
+          return;
+        }
+        Remake(id, checked, caller, [this, caller, answer](absl::StatusOr<SessionView> remade) {
+          KeepUpdate(std::move(remade), caller, answer);
+        });
+      });
+}
+
+void SessionLoader::KeepUpdate(absl::StatusOr<SessionView> remade, const Caller& caller,
+                               const ViewCallback& done) {
+  absl::Status refusal = remade.status();
+  // The last moment.
+  if (refusal.ok()) refusal = caller.cancellation.Check();
+  if (refusal.ok()) refusal = remade->session->CheckHeld();
+  if (!refusal.ok()) {
+    if (remade.ok()) remade->session.reset();
+    done(refusal);
+    return;
+  }
+  caller.Tell(SessionStage::kKeeping);
+  sync_->KeepUpdate(*std::move(remade), done);
+}
+
+bool SessionLoader::PostUnlessStopped(WorkerPool::Job job) {
+  // Under the lock: after Stop the pool may be gone.
+  MutexLock lock(mutex_);
+  if (!stopped_) pool_->Post(Lane::kStore, std::move(job));
+  return !stopped_;
+}
+
+void SessionLoader::Stop() {
+  MutexLock lock(mutex_);
+  stopped_ = true;
 }
 
 }  // namespace tissueform

@@ -86,9 +86,9 @@ void AddLaneMetrics(const WorkerPool& pool, MetricsPage* page) {
 void AddSessionMetrics(const SessionRegistry& registry, const SessionEventCounts& events,
                        MetricsPage* page) {
   page->AddGauge("tissueform_sessions", "Sessions, by where they are.", {{"place", "memory"}},
-                 [&registry] { return static_cast<double>(registry.size()); });
+                 [&registry] { return static_cast<double>(registry.table().size()); });
   page->AddGauge("tissueform_sessions", "", {{"place", "stored"}}, [&registry] {
-    return static_cast<double>(registry.CountKnown() - registry.size());
+    return static_cast<double>(registry.table().CountKnown() - registry.table().size());
   });
   const std::pair<SessionEvent, const char*> kNames[] = {{SessionEvent::kEvicted, "evicted"},
                                                          {SessionEvent::kRestored, "restored"},

@@ -128,8 +128,8 @@ class Play {
         }
         break;
       case 2:
-        rig_->clock.Advance(2 * SessionRegistry::kInUse);
-        rig_->registry.Evict([] { return false; });
+        rig_->clock.Advance(2 * SessionTable::kInUse);
+        rig_->registry.table().Evict([] { return false; });
         break;
       case 3:
         drag_.reset();

@@ -61,17 +61,16 @@ RpcRig::RpcRig() {
   SetBlasThreads(1);
   spdlog::set_level(spdlog::level::off);
   google::protobuf::SetLogHandler(nullptr);  // one line for every name that is no UTF-8
-  registry.set_observer([this](const std::string& id, SessionRegistry::Event event) {
-    watches.OnSessionEvent(id, event);
-  });
+  registry.table().set_observer(
+      [this](const std::string& id, SessionEvent event) { watches.OnSessionEvent(id, event); });
   auto bar = testing::Store(testing::SampleMesh(testing::Bar({1, 1, 2})), &catalog);
   SessionRecord record = testing::BarRecord(*bar);
   record.id = "fuzzed";
   std::promise<bool> made;
-  registry.Create(std::move(record), bar, std::make_shared<std::atomic<bool>>(),
-                  [&made](const absl::StatusOr<std::shared_ptr<Session>>& session) {
-                    made.set_value(session.ok());
-                  });
+  registry.loader().Create(std::move(record), bar, std::make_shared<std::atomic<bool>>(),
+                           [&made](const absl::StatusOr<std::shared_ptr<Session>>& session) {
+                             made.set_value(session.ok());
+                           });
   Require(made.get_future().get());
 }
 

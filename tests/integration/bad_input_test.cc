@@ -174,7 +174,7 @@ class BadSessionTest : public BadInputTest {
     change(request);
     EXPECT_THAT(client->CreateSession(request), StatusIs(code, HasSubstr(text)));
     EXPECT_EQ(server().memory_budget().reserved_bytes(), reserved) << text;
-    EXPECT_EQ(server().sessions().size(), 0) << text;
+    EXPECT_EQ(server().sessions().table().size(), 0) << text;
   }
 
   const BarProblem problem_{5};

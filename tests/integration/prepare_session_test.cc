@@ -103,7 +103,7 @@ TEST_F(PrepareSessionServiceTest, ACancelledWaitEndsAndLeavesNothing) {
   EXPECT_THAT(client->PrepareSession(request, wait),
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("")));
   EXPECT_TRUE(Eventually([&] {
-    return server().sessions().size() == 0 &&
+    return server().sessions().table().size() == 0 &&
            server().memory_budget().reserved_bytes() == mesh_bytes;
   }));
   // The same request again: joins what is being given up, or makes it anew.
@@ -123,7 +123,7 @@ TEST_F(PrepareSessionServiceTest, WhoWaitsForTheSamePreparationHearsOfIt) {
   ASSERT_THAT(one, IsOk());
   ASSERT_THAT(two, IsOk());
   EXPECT_EQ(one->name(), two->name());
-  EXPECT_EQ(server().sessions().size(), 1);
+  EXPECT_EQ(server().sessions().table().size(), 1);
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ TEST_F(SessionsTest, EightSessionsAtOnceGiveEightRightAnswers) {
   for (int s = 0; s < kSessions; ++s) {
     EXPECT_LT(worst[s], kFloat32Tolerance) << "session " << s;
   }
-  EXPECT_EQ(server().sessions().size(), kSessions);
+  EXPECT_EQ(server().sessions().table().size(), kSessions);
 }
 
 TEST_F(SessionsTest, TheSameMeshAgainIsNotSent) {
@@ -178,9 +178,9 @@ TEST_F(SessionsTest, CancelledCreationsLeaveNothingBehind) {
     EXPECT_THAT(client->DeleteSession(session.name()), IsOk());
   }
   EXPECT_TRUE(Eventually([&] {
-    return server().sessions().size() == 0 &&
+    return server().sessions().table().size() == 0 &&
            server().memory_budget().reserved_bytes() == mesh_bytes;
-  })) << server().sessions().size()
+  })) << server().sessions().table().size()
       << " sessions, " << server().memory_budget().reserved_bytes() - mesh_bytes << " bytes left";
 }
 

@@ -14,7 +14,7 @@
 
 #include "core/base/error_reason.h"
 #include "core/base/mutex.h"
-#include "server/session/session_ownership.h"
+#include "server/session/session_lease_table.h"
 #include "server/store/store_errors.h"
 #include "tests/testing/in_memory_stores.h"
 
@@ -79,8 +79,6 @@ class FakeOwnership final : public SessionOwnership {
  public:
   FakeOwnership(SharedSessions* shared, std::string node)
       : shared_(*shared), node_(std::move(node)) {}
-
-  bool is_shared() const override { return true; }
 
   absl::StatusOr<int64_t> Acquire(const std::string& id) override {
     std::function<void()> acquired;

@@ -92,7 +92,7 @@ absl::Status SessionWatches::Acknowledge(const std::string& watch, uint64_t numb
                     ErrorReason::kWatchNotFound);
 }
 
-void SessionWatches::OnSessionEvent(const std::string& session_id, SessionRegistry::Event event) {
+void SessionWatches::OnSessionEvent(const std::string& session_id, SessionEvent event) {
   MutexLock lock(mutex_);
   const auto found = channels_.find(session_id);
   const std::shared_ptr<WatchChannel> channel =
@@ -100,20 +100,20 @@ void SessionWatches::OnSessionEvent(const std::string& session_id, SessionRegist
   if (channel == nullptr) return;
   v1::DeformNotice notice;
   switch (event) {
-    case SessionRegistry::Event::kDeleted:
+    case SessionEvent::kDeleted:
       // The next session of this id is another one.
       channels_.erase(found);
       channel->EndWatches(SessionDeleted(session_id));
       return;
-    case SessionRegistry::Event::kMoved:
+    case SessionEvent::kMoved:
       // Whoever watches here again begins with the committed pose, not with a frame of before.
       channels_.erase(found);
       channel->EndWatches(SessionMoved(""));
       return;
-    case SessionRegistry::Event::kEvicted:
+    case SessionEvent::kEvicted:
       notice.mutable_evicted();
       break;
-    case SessionRegistry::Event::kRestored:
+    case SessionEvent::kRestored:
       notice.mutable_restored();
       break;
   }

@@ -62,7 +62,7 @@ class SessionWatches {
   absl::Status Acknowledge(const std::string& watch, uint64_t number, const Authenticated& by = {});
 
   // As the registry's observer.
-  void OnSessionEvent(const std::string& session_id, SessionRegistry::Event event);
+  void OnSessionEvent(const std::string& session_id, SessionEvent event);
   // From now on watches end with the drags.
   void NotifyDraining(std::chrono::system_clock::time_point end);
 

@@ -145,17 +145,17 @@ TEST_F(ClusterFoundTest, WhatIsDeletedOrSharedOnOneNodeIsSoOnTheOthersSoon) {
   // And by hand.
   RunSql("DELETE FROM sessions;");
   EXPECT_TRUE(Eventually([&] { return absl::IsNotFound(FindSession(b_, session)); }));
-  EXPECT_TRUE(Eventually([&] { return b_.server->sessions().CountKnown() == 0; }));
+  EXPECT_TRUE(Eventually([&] { return b_.server->sessions().table().CountKnown() == 0; }));
 }
 
 TEST_F(ClusterFoundTest, WhoMissedNoticesLearnsAllThatHasHappened) {
   const std::string session = MakeSession(a_, 1);
-  ASSERT_TRUE(Eventually([&] { return b_.server->sessions().CountKnown() == 1; }));
+  ASSERT_TRUE(Eventually([&] { return b_.server->sessions().table().CountKnown() == 1; }));
   // In one transaction: when b's listener is back the session is long gone.
   RunSql(
       "DELETE FROM sessions; SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE "
       "application_name = 'tissueform-server' AND pid <> pg_backend_pid();");
-  EXPECT_TRUE(Eventually([&] { return b_.server->sessions().CountKnown() == 0; }));
+  EXPECT_TRUE(Eventually([&] { return b_.server->sessions().table().CountKnown() == 0; }));
   EXPECT_THAT(FindSession(b_, session), StatusIs(Code::kNotFound));
 }
 

@@ -37,7 +37,7 @@ bool HasMoved(const std::optional<grpc::Status>& status) {
 class MovedSessionTest : protected SharedStore, public ReactorsTest {
  protected:
   MovedSessionTest() : ReactorsTest(&shared_store_, &here_) {
-    registry_.set_observer([this](const std::string& id, SessionEvent event) {
+    registry_.table().set_observer([this](const std::string& id, SessionEvent event) {
       streams_.OnSessionEvent(id, event);
       watches_.OnSessionEvent(id, event);
     });
@@ -109,7 +109,7 @@ TEST_F(MovedSessionTest, AFrameThatWaitsForItsWriteIsNotWritten) {
   stream->Send(Pose(2));
   // It is made while the first is being written.
   std::promise<void> made;
-  registry_.Loaded()[0]->strand().Post(Lane::kSolves, [&made] { made.set_value(); });
+  registry_.table().Loaded()[0]->strand().Post(Lane::kSolves, [&made] { made.set_value(); });
   made.get_future().wait();
   LetLeasesRunOut();
   stream->ReadOn();
@@ -185,8 +185,8 @@ TEST_F(MovedSessionTest, AStreamDoesNotWaitForACommitThatTheStoreNeverAnswers) {
 TEST_F(MovedSessionTest, AStreamWhoseSessionHadLeftMemoryIsToldWhoHasIt) {
   const std::string session = MakeSession();
   const auto stream = Drag(session);
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  EXPECT_EQ(registry_.Evict([] { return false; }), 1);
+  clock_.Advance(2 * SessionTable::kInUse);
+  EXPECT_EQ(registry_.table().Evict([] { return false; }), 1);
   FakeUnaryCall once(reactions_.get());
   v1::DeformOnceRequest request;
   request.set_session(session);
@@ -204,8 +204,8 @@ TEST_F(MovedSessionTest, AStreamWhoseSessionHadLeftMemoryIsToldWhoHasIt) {
 TEST_F(MovedSessionTest, AStreamThatWaitsForItsSessionToBeMadeEndsAtOnce) {
   const std::string session = MakeSession();
   const auto stream = Drag(session);
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  EXPECT_EQ(registry_.Evict([] { return false; }), 1);
+  clock_.Advance(2 * SessionTable::kInUse);
+  EXPECT_EQ(registry_.table().Evict([] { return false; }), 1);
   std::promise<void> release;
   const std::shared_future<void> released = release.get_future().share();
   for (int worker = 0; worker < kWorkers; ++worker) {
@@ -274,8 +274,8 @@ TEST_F(MovedSessionTest, ASessionIsHeldWhileItIsWatched) {
   const std::string session = MakeSession();
   WatchCall watch(reactions_.get(), &deform_service_, session);
   watch.Begin(v1::WATCH_ORIGIN_REST);
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  EXPECT_EQ(registry_.Evict([] { return false; }), 1);
+  clock_.Advance(2 * SessionTable::kInUse);
+  EXPECT_EQ(registry_.table().Evict([] { return false; }), 1);
   EXPECT_FALSE(there_.Acquire(IdOf(session)).ok());
   EXPECT_TRUE(here_.EpochOf(IdOf(session)).has_value());
   watch.Cancel();

@@ -116,16 +116,16 @@ class PrepareSessionTest : public ReactorsTest {
 
   void Evict() {
     Drain();
-    clock_.Advance(2 * SessionRegistry::kInUse);
-    registry_.Evict([] { return false; });
+    clock_.Advance(2 * SessionTable::kInUse);
+    registry_.table().Evict([] { return false; });
   }
 
   std::string EtagOf(const std::string& session) {
     std::string etag;
-    registry_.Look(session.substr(session.find('/') + 1),
-                   [&etag](const absl::StatusOr<SessionRegistry::View>& view) {
-                     if (view.ok()) etag = view->record.etag;
-                   });
+    registry_.sync().Look(session.substr(session.find('/') + 1),
+                          [&etag](const absl::StatusOr<SessionView>& view) {
+                            if (view.ok()) etag = view->record.etag;
+                          });
     return etag;
   }
 
@@ -142,7 +142,7 @@ TEST_F(PrepareSessionTest, ACreationTellsItsStagesInOrderThenTheSession) {
   ASSERT_TRUE(outcome.session.has_value());
   EXPECT_EQ(outcome.session->state(), v1::SESSION_STATE_READY);
   EXPECT_FALSE(outcome.session->etag().empty());
-  EXPECT_EQ(registry_.size(), 1);
+  EXPECT_EQ(registry_.table().size(), 1);
 }
 
 TEST_F(PrepareSessionTest, WhatIsReadyIsAnsweredAtOnce) {
@@ -159,7 +159,7 @@ TEST_F(PrepareSessionTest, ASessionThatHadLeftMemoryComesBackAndSoDoesOneThatIsU
   const std::string session = MakeSession();
   const std::string etag = EtagOf(session);
   Evict();
-  ASSERT_EQ(registry_.size(), 0);
+  ASSERT_EQ(registry_.table().size(), 0);
   v1::PrepareSessionRequest request;
   request.set_open(session);
   const std::vector<v1::PreparationStage> making = {v1::PREPARATION_STAGE_READING_MESH,
@@ -171,7 +171,7 @@ TEST_F(PrepareSessionTest, ASessionThatHadLeftMemoryComesBackAndSoDoesOneThatIsU
   Outcome outcome = Run(request);
   EXPECT_EQ(outcome.stages.front(), v1::PREPARATION_STAGE_READING_MESH);
   EXPECT_THAT(outcome.stages, IsSubsetOf(making));
-  EXPECT_EQ(registry_.size(), 1);
+  EXPECT_EQ(registry_.table().size(), 1);
   EXPECT_EQ(outcome.session->etag(), etag);
   request.mutable_update()->set_name(session);
   request.mutable_update()->mutable_stiffness()->set_uniform_pa(500);
@@ -215,7 +215,7 @@ TEST_F(PrepareSessionTest, AnswersThatCannotBeMadeLeaveNoSession) {
   EXPECT_EQ(outcome.status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_THAT(outcome.status.error_message(), HasSubstr("prepared answers"));
   Drain();
-  EXPECT_EQ(registry_.size(), 0);
+  EXPECT_EQ(registry_.table().size(), 0);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
 }
 
@@ -271,7 +271,7 @@ TEST_F(PrepareSessionTest, CancelledInAnyStageItIsAnsweredAtOnceAndLeavesNothing
     const auto cancelled = std::make_shared<std::atomic<bool>>(false);
     bool held = false;
     std::thread blocking([&] {
-      registry_.Create(
+      registry_.loader().Create(
           *record, mesh, cancelled, [](const absl::StatusOr<std::shared_ptr<Session>>&) {},
           [&](const SessionProgress& progress) {
             if (progress.stage != stage || std::exchange(held, true)) return;
@@ -286,12 +286,12 @@ TEST_F(PrepareSessionTest, CancelledInAnyStageItIsAnsweredAtOnceAndLeavesNothing
     EXPECT_EQ(EndOf(call.get()).status.error_code(), grpc::StatusCode::CANCELLED);
     EXPECT_TRUE(gate_.WaitUntilIdle(std::chrono::steady_clock::now()));
     *cancelled = true;
-    registry_.CancelWait(cancelled);
+    registry_.loader().CancelWait(cancelled);
     go.set_value();
     blocking.join();
     Drain();
     Drain();
-    EXPECT_EQ(registry_.size(), 0);
+    EXPECT_EQ(registry_.table().size(), 0);
     EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
   }
 }
@@ -337,7 +337,7 @@ TEST_F(PrepareSessionTest, ARestoreThatIsCancelledWhileItReadsIsAnsweredAtOnce) 
   EXPECT_EQ(EndOf(call.get()).status.error_code(), grpc::StatusCode::CANCELLED);
   go.set_value();
   Drain();
-  EXPECT_EQ(registry_.size(), 0);
+  EXPECT_EQ(registry_.table().size(), 0);
   EXPECT_TRUE(Run(request).session.has_value());
 }
 
@@ -359,7 +359,7 @@ TEST_F(PrepareSessionTest, TwoCallsOfOneRequestBothSeeItAndGetOneSession) {
   }
   ASSERT_TRUE(first.session.has_value() && second.session.has_value());
   EXPECT_EQ(first.session->name(), second.session->name());
-  EXPECT_EQ(registry_.size(), 1);
+  EXPECT_EQ(registry_.table().size(), 1);
 }
 
 TEST_F(PrepareSessionTest, ASlowReaderHoldsNothingUpAndIsToldTheNewest) {
@@ -369,8 +369,8 @@ TEST_F(PrepareSessionTest, ASlowReaderHoldsNothingUpAndIsToldTheNewest) {
   call->Bind(session_service_.PrepareSession(nullptr, &request));
   // Made while nothing is read.
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-  while (registry_.size() == 0 && std::chrono::steady_clock::now() < deadline) Drain();
-  ASSERT_EQ(registry_.size(), 1);
+  while (registry_.table().size() == 0 && std::chrono::steady_clock::now() < deadline) Drain();
+  ASSERT_EQ(registry_.table().size(), 1);
   Drain();
   call->ReadOn();
   const Outcome outcome = EndOf(call.get());
@@ -393,14 +393,15 @@ TEST_F(PrepareSessionTest, OnlyTheSessionsThatWereNotCancelledStay) {
     if (!outcome.session.has_value()) continue;
     // A cancelled call that ended before it heard of its cancellation was like any other.
     const std::string id = *ParseSessionName(outcome.session->name());
-    if (!registry_.Find(id).ok()) continue;
+    if (!registry_.table().Find(id).ok()) continue;
     std::promise<absl::Status> deleted;
-    registry_.Delete(id, [&deleted](absl::Status status) { deleted.set_value(std::move(status)); });
+    registry_.sync().Delete(
+        id, [&deleted](absl::Status status) { deleted.set_value(std::move(status)); });
     EXPECT_TRUE(deleted.get_future().get().ok());
   }
   Drain();
   Drain();
-  EXPECT_EQ(registry_.size(), 0) << "a session that nobody knows of";
+  EXPECT_EQ(registry_.table().size(), 0) << "a session that nobody knows of";
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
 }
 

@@ -57,8 +57,7 @@ inline constexpr int kWorkers = 2;
 class ReactorsTest : public ::testing::Test {
  protected:
   // `sessions`: what the records are kept in; null: a store of its own.
-  explicit ReactorsTest(SessionStore* sessions = nullptr,
-                        SessionOwnership* ownership = SoleOwnership::Get())
+  explicit ReactorsTest(SessionStore* sessions = nullptr, SessionOwnership* ownership = nullptr)
       : sessions_(sessions != nullptr ? sessions : &store_), ownership_(ownership) {}
   ~ReactorsTest() override {
     reactions_.reset();

@@ -68,8 +68,8 @@ TEST_F(ReactorsTest, AStreamGoesOnWhenItsSessionHadLeftMemory) {
       EXPECT_EQ(response->frame().summary().prepared(), prepared);
       ExpectAnswers(response->frame());
       stream.Send(Ack(sequence));
-      clock_.Advance(2 * SessionRegistry::kInUse);
-      EXPECT_EQ(registry_.Evict([] { return false; }), 1);
+      clock_.Advance(2 * SessionTable::kInUse);
+      EXPECT_EQ(registry_.table().Evict([] { return false; }), 1);
     }
     stream.CloseSending();
     EXPECT_FALSE(stream.Receive().has_value());
@@ -166,11 +166,11 @@ TEST_F(ReactorsTest, CommitsAreAnsweredEachOrByANewerOne) {
   EXPECT_TRUE(stream.WaitUntilDone()->ok());
   EXPECT_EQ(committed, kLast) << "also the last one, whose client had closed its side";
   v1::Session description;
-  registry_.Look(session.substr(session.find('/') + 1),
-                 [&description](const absl::StatusOr<SessionRegistry::View>& view) {
-                   ASSERT_THAT(view, IsOk());
-                   description = ToProto(*view);
-                 });
+  registry_.sync().Look(session.substr(session.find('/') + 1),
+                        [&description](const absl::StatusOr<SessionView>& view) {
+                          ASSERT_THAT(view, IsOk());
+                          description = ToProto(*view);
+                        });
   ASSERT_EQ(description.committed_poses_size(), 1);
   EXPECT_EQ(description.committed_poses(0).translation_mm().z(), kLast / 64.0);
 }
@@ -192,8 +192,8 @@ TEST_F(ReactorsTest, StreamsSurviveWhateverTheClientDoes) {
           cancelled = random() % 4 == 0;
           break;
         case 2:
-          clock_.Advance(2 * SessionRegistry::kInUse);
-          registry_.Evict([] { return false; });
+          clock_.Advance(2 * SessionTable::kInUse);
+          registry_.table().Evict([] { return false; });
           break;
         case 1:
           streams_.NotifyDraining(std::chrono::system_clock::now());
@@ -336,17 +336,17 @@ TEST_F(ReactorsTest, OnlyTheSessionsThatWereNotCancelledStay) {
   }
   // A cancelled call that ended before it heard of its cancellation was like any other.
   const int expected = kCalls - kCalls / 3;
-  EXPECT_GE(registry_.size(), expected);
+  EXPECT_GE(registry_.table().size(), expected);
   for (const v1::Session& session : sessions) {
     const auto id = ParseSessionName(session.name());
-    if (id.ok() && registry_.Find(*id).ok()) {
+    if (id.ok() && registry_.table().Find(*id).ok()) {
       std::promise<absl::Status> deleted;
-      registry_.Delete(*id,
-                       [&deleted](absl::Status status) { deleted.set_value(std::move(status)); });
+      registry_.sync().Delete(
+          *id, [&deleted](absl::Status status) { deleted.set_value(std::move(status)); });
       EXPECT_TRUE(deleted.get_future().get().ok());
     }
   }
-  EXPECT_EQ(registry_.size(), 0) << "a session that nobody knows of";
+  EXPECT_EQ(registry_.table().size(), 0) << "a session that nobody knows of";
 }
 
 }  // namespace

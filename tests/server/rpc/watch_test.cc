@@ -32,9 +32,8 @@ using ::testing::HasSubstr;
 class WatchTest : public ReactorsTest {
  protected:
   WatchTest() {
-    registry_.set_observer([this](const std::string& id, SessionRegistry::Event event) {
-      watches_.OnSessionEvent(id, event);
-    });
+    registry_.table().set_observer(
+        [this](const std::string& id, SessionEvent event) { watches_.OnSessionEvent(id, event); });
   }
 
   std::unique_ptr<WatchCall> Watch(const std::string& session,
@@ -261,13 +260,13 @@ TEST_F(WatchTest, AWatchIsToldThatItsSessionLeavesMemoryComesBackAndIsDeleted) {
   const std::string session = MakeSession();
   auto watch = Watch(session);
   watch->Begin(v1::WATCH_ORIGIN_REST);
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  EXPECT_EQ(registry_.Evict([] { return false; }), 1) << "watching is no use";
+  clock_.Advance(2 * SessionTable::kInUse);
+  EXPECT_EQ(registry_.table().Evict([] { return false; }), 1) << "watching is no use";
   EXPECT_TRUE(watch->Receive()->notice().has_evicted());
   EndDrag(Drag(session));
   EXPECT_TRUE(watch->Receive()->notice().has_restored());
-  registry_.Delete(session.substr(session.find('/') + 1),
-                   [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
+  registry_.sync().Delete(session.substr(session.find('/') + 1),
+                          [](const absl::Status& status) { EXPECT_THAT(status, IsOk()); });
   EXPECT_FALSE(watch->Receive().has_value());
   EXPECT_EQ(watch->WaitUntilDone()->error_code(), grpc::StatusCode::NOT_FOUND);
   EXPECT_EQ(watches_.size(), 0);
@@ -338,8 +337,8 @@ TEST_F(WatchTest, WatchesSurviveWhateverHappens) {
           if (!watches.empty()) watches[random() % watches.size()]->Cancel();
           break;
         case 2:
-          clock_.Advance(2 * SessionRegistry::kInUse);
-          registry_.Evict([] { return false; });
+          clock_.Advance(2 * SessionTable::kInUse);
+          registry_.table().Evict([] { return false; });
           break;
         default:
           drag->Send(Pose(sequence));
@@ -348,7 +347,8 @@ TEST_F(WatchTest, WatchesSurviveWhateverHappens) {
     }
     drag->Cancel();
     drag->WaitUntilDone();
-    registry_.Delete(session.substr(session.find('/') + 1), [](const absl::Status& /*status*/) {});
+    registry_.sync().Delete(session.substr(session.find('/') + 1),
+                            [](const absl::Status& /*status*/) {});
     for (const auto& watch : watches) {
       uint64_t last = 0;
       while (const auto response = watch->Receive()) {

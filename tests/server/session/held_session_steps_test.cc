@@ -89,7 +89,7 @@ class HeldSessionStepsTest : public ::testing::Test {
   }
 
   void Make(size_t node) {
-    node_(node).registry.Forget(id_);  // it has heard that the one before is gone
+    node_(node).registry.sync().OnDeleted(id_);  // it has heard that the one before is gone
     const Node::Opened created = node_(node).Create(id_);
     ASSERT_THAT(created, IsOk());
     drags_[node].push_back(*created);
@@ -199,7 +199,8 @@ class HeldSessionStepsTest : public ::testing::Test {
     }
     for (const size_t node : {0, 1}) {
       Node& server = node_(node);
-      absl::StrAppend(&state, "; ", server.registry.Knows(id_), server.registry.Find(id_).ok(),
+      absl::StrAppend(&state, "; ", server.registry.table().Knows(id_),
+                      server.registry.table().Find(id_).ok(),
                       server.ownership.EpochOf(id_).has_value());
       std::set<std::string> drags;
       for (const auto& drag : drags_[node]) {
@@ -226,9 +227,9 @@ class HeldSessionStepsTest : public ::testing::Test {
       for (const std::string& lost : node_(node).ownership.TakeEnded()) {
         node_(node).registry.Lost(lost);
       }
-      node_(node).registry.Forget(id_);
+      node_(node).registry.sync().OnDeleted(id_);
       node_(node).Settle();
-      EXPECT_FALSE(node_(node).registry.Knows(id_));
+      EXPECT_FALSE(node_(node).registry.table().Knows(id_));
     }
   }
 

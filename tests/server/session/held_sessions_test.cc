@@ -54,16 +54,16 @@ TEST_F(HeldSessionsTest, WhoMakesASessionHoldsItAndOthersAreToldWhoDoes) {
     EXPECT_EQ(NodeIn(refused), "a");
   }
   EXPECT_THAT(b_.Look("s"), IsOk()) << "it is only read";
-  EXPECT_EQ(b_.registry.size(), 0);
+  EXPECT_EQ(b_.registry.table().size(), 0);
   EXPECT_THAT(a_.Update("s"), IsOk());
   EXPECT_THAT(a_.Delete("s"), IsOk());
   EXPECT_THAT(b_.Open("s"), StatusIs(absl::StatusCode::kNotFound));
-  EXPECT_EQ(b_.registry.CountKnown(), 0) << "nothing of it stays known";
+  EXPECT_EQ(b_.registry.table().CountKnown(), 0) << "nothing of it stays known";
 }
 
 TEST_F(HeldSessionsTest, ASessionThatAnotherServerHasMadeIsFoundWithoutBeingToldOfIt) {
   ASSERT_THAT(a_.Create("s"), IsOk());
-  EXPECT_EQ(b_.registry.CountKnown(), 0);
+  EXPECT_EQ(b_.registry.table().CountKnown(), 0);
   shared_.Wait(kPastTheLease);
   EXPECT_THAT(b_.Open("s"), IsOk());
   shared_.Wait(kPastTheLease);
@@ -84,7 +84,7 @@ TEST_F(HeldSessionsTest, ARequestThatIsRepeatedElsewhereIsTheSameRequest) {
   shared_.Wait(kPastTheLease);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, b_.Create("s", "request"));
   EXPECT_EQ(session->id(), "s");
-  EXPECT_EQ(b_.registry.CountKnown(), 1);
+  EXPECT_EQ(b_.registry.table().CountKnown(), 1);
 }
 
 TEST_F(HeldSessionsTest, WhatWasTakenOverIsNeitherAnsweredNorWrittenByWhoHadIt) {
@@ -102,7 +102,7 @@ TEST_F(HeldSessionsTest, WhatWasTakenOverIsNeitherAnsweredNorWrittenByWhoHadIt) 
   EXPECT_EQ(shared_.refused_writes(), 0);
   EXPECT_TRUE(IsMoved(a_.Commit(before, 4)));
   EXPECT_EQ(shared_.refused_writes(), 1);
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, b_.Look("s"));
+  ASSERT_OK_AND_ASSIGN(const SessionView view, b_.Look("s"));
   EXPECT_EQ(view.record.last_poses[0].translation_mm.z(), 3);
   EXPECT_EQ(shared_.stale_writes(), 0);
 }
@@ -136,8 +136,8 @@ TEST_F(HeldSessionsTest, WhatIsLostLeavesMemoryAndStaysKnown) {
   EXPECT_THAT(a_.ownership.Renew(), ::testing::ElementsAre("s"));
   a_.registry.Lost("s");
   EXPECT_EQ(a_.CountMoved("s"), 1);
-  EXPECT_EQ(a_.registry.size(), 0);
-  EXPECT_EQ(a_.registry.CountKnown(), 1);
+  EXPECT_EQ(a_.registry.table().size(), 0);
+  EXPECT_EQ(a_.registry.table().CountKnown(), 1);
   EXPECT_LT(a_.reserved_bytes(), bytes) << "though somebody has the session";
   EXPECT_TRUE(session->moved());
   EXPECT_FALSE(session->evicted()) << "no stream may open it again and go on";
@@ -164,7 +164,7 @@ TEST_F(HeldSessionsTest, ASessionThatIsLostWhileItIsMadeIsNotGivenOut) {
   shared_.Wait(kPastTheLease);
   b_.ownership.set_acquired([&] { shared_.Wait(kPastTheLease); });
   EXPECT_TRUE(IsMoved(b_.Open("s").status()));
-  EXPECT_EQ(b_.registry.size(), 0);
+  EXPECT_EQ(b_.registry.table().size(), 0);
   b_.ownership.set_acquired(nullptr);
   EXPECT_THAT(b_.Open("s"), IsOk());
 }
@@ -184,8 +184,9 @@ TEST_F(HeldSessionsTest, WhoWaitsForASessionThatIsLostMeanwhileDoesNotWaitForThe
   a_.Settle();
   std::promise<void> store = a_.HoldUp(Lane::kStore);
   std::promise<absl::Status> opened;
-  a_.registry.Open("s", std::make_shared<std::atomic<bool>>(),
-                   [&opened](const Node::Opened& session) { opened.set_value(session.status()); });
+  a_.registry.loader().Open(
+      "s", std::make_shared<std::atomic<bool>>(),
+      [&opened](const Node::Opened& session) { opened.set_value(session.status()); });
   while (!a_.ownership.EpochOf("s").has_value()) std::this_thread::yield();
   a_.registry.Lost("s");
   std::future<absl::Status> answer = opened.get_future();
@@ -197,7 +198,7 @@ TEST_F(HeldSessionsTest, WhoWaitsForASessionThatIsLostMeanwhileDoesNotWaitForThe
   ASSERT_THAT(b_.Open("s"), IsOk()) << "and elsewhere it is found";
   store.set_value();
   a_.Settle();
-  EXPECT_EQ(a_.registry.size(), 0) << "what nobody waits for is not kept";
+  EXPECT_EQ(a_.registry.table().size(), 0) << "what nobody waits for is not kept";
 }
 
 // As when the database comes back: whoever asked may have made it elsewhere, and deleted it again.
@@ -259,31 +260,31 @@ TEST_F(HeldSessionsTest, WhatCannotBeMadeIsOthersBeforeAnybodyHearsOfIt) {
   ASSERT_THAT(a_.Create("s"), IsOk());
   shared_.Wait(kPastTheLease);
   // Unknown to b, whose catalog has lost the mesh.
-  const absl::Status removed = b_.registry.RemoveMesh(a_.Look("s")->record.mesh_sha256);
+  const absl::Status removed = b_.registry.table().RemoveMesh(a_.Look("s")->record.mesh_sha256);
   ASSERT_THAT(removed, IsOk());
   EXPECT_THAT(b_.Open("s"), StatusIs(absl::StatusCode::kNotFound));
   EXPECT_TRUE(shared_.Find("s")->node.empty());
-  EXPECT_EQ(b_.registry.CountKnown(), 1) << "the mesh is gone, not the session";
+  EXPECT_EQ(b_.registry.table().CountKnown(), 1) << "the mesh is gone, not the session";
   EXPECT_THAT(a_.Open("s"), IsOk());
 }
 
 TEST_F(HeldSessionsTest, NewsOfOthersAreLearntAndThoseOfOwnDoingPassedOver) {
   ASSERT_THAT(a_.Create("s", "request"), IsOk());
   SessionRecord record = a_.Look("s")->record;
-  a_.registry.OnCreated(record);
-  a_.registry.Changed(record);
-  a_.registry.Forget("s");
-  EXPECT_EQ(a_.registry.size(), 1) << "it is held: whoever deletes it takes it first";
-  b_.registry.Changed(record);
-  b_.registry.OnCreated(record);
-  EXPECT_EQ(b_.registry.CountMadeFrom(record.mesh_sha256), 1);
+  a_.registry.sync().OnChanged(record);
+  a_.registry.sync().OnChanged(record);
+  a_.registry.sync().OnDeleted("s");
+  EXPECT_EQ(a_.registry.table().size(), 1) << "it is held: whoever deletes it takes it first";
+  b_.registry.sync().OnChanged(record);
+  b_.registry.sync().OnChanged(record);
+  EXPECT_EQ(b_.registry.table().CountMadeFrom(record.mesh_sha256), 1);
   EXPECT_TRUE(IsMoved(b_.Create("", "request").status())) << "the same request, to be called at a";
   record.mesh_sha256 = std::string(64, 'f');
-  b_.registry.Changed(record);
-  EXPECT_EQ(b_.registry.CountMadeFrom(record.mesh_sha256), 1);
-  b_.registry.Forget("s");
-  b_.registry.Forget("s");
-  EXPECT_EQ(b_.registry.CountKnown(), 0);
+  b_.registry.sync().OnChanged(record);
+  EXPECT_EQ(b_.registry.table().CountMadeFrom(record.mesh_sha256), 1);
+  b_.registry.sync().OnDeleted("s");
+  b_.registry.sync().OnDeleted("s");
+  EXPECT_EQ(b_.registry.table().CountKnown(), 0);
 }
 
 TEST_F(HeldSessionsTest, OnlyWhatCanBeTakenIsRemovedForItsAge) {
@@ -292,11 +293,11 @@ TEST_F(HeldSessionsTest, OnlyWhatCanBeTakenIsRemovedForItsAge) {
   a_.EvictAll();
   a_.Settle();
   ASSERT_THAT(a_.Open("held"), IsOk());
-  ASSERT_THAT(b_.registry.LearnKnown(), IsOk());
-  EXPECT_EQ(b_.registry.RemoveUnused({"held", "free", "never"}, b_.clock.Now()), 1);
+  ASSERT_THAT(b_.registry.sync().LearnAll(), IsOk());
+  EXPECT_EQ(b_.registry.sync().RemoveUnused({"held", "free", "never"}, b_.clock.Now()), 1);
   EXPECT_THAT(a_.Look("held"), IsOk());
   EXPECT_THAT(a_.Look("free"), StatusIs(absl::StatusCode::kNotFound));
-  EXPECT_TRUE(b_.registry.Knows("held"));
+  EXPECT_TRUE(b_.registry.table().Knows("held"));
 }
 
 TEST_F(HeldSessionsTest, AServerThatHandsOverHasNothingLeftAndTakesNothingMore) {
@@ -307,7 +308,7 @@ TEST_F(HeldSessionsTest, AServerThatHandsOverHasNothingLeftAndTakesNothingMore) 
   EXPECT_TRUE(IsMoved(dragged->CheckHeld()));
   EXPECT_TRUE(IsMoved(a_.Commit(dragged, 2)));
   EXPECT_TRUE(IsMoved(a_.Open("loaded").status()));
-  EXPECT_EQ(a_.registry.size(), 0);
+  EXPECT_EQ(a_.registry.table().size(), 0);
   for (const char* id : {"dragged", "loaded"}) {
     EXPECT_EQ(a_.CountMoved(id), 1);
     EXPECT_THAT(b_.Open(id), IsOk()) << "at once, no lease has to run out";

@@ -60,7 +60,7 @@ class HousekeepingTest : public ::testing::Test {
     pool_ = std::make_unique<WorkerPool>(1);
     registry_ = std::make_unique<SessionRegistry>(limits_, &budget_, pool_.get(),
                                                   &stores_->sessions(), catalog_.get(), &clock_);
-    ASSERT_THAT(registry_->LearnKnown(), IsOk());
+    ASSERT_THAT(registry_->sync().LearnAll(), IsOk());
     housekeeping_ = std::make_unique<Housekeeping>(
         Housekeeping::Options{.retention_days = retention_days,
                               .unix_clock = [this] { return unix_s_.load(); },
@@ -78,8 +78,8 @@ class HousekeepingTest : public ::testing::Test {
     SessionRecord record = BarRecord(*bar_);
     record.id = id;
     std::promise<Opened> made;
-    registry_->Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
-                      [&made](Opened session) { made.set_value(std::move(session)); });
+    registry_->loader().Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+                               [&made](Opened session) { made.set_value(std::move(session)); });
     Opened session = made.get_future().get();
     EXPECT_THAT(session, IsOk());
     WaitForWorker();
@@ -88,8 +88,8 @@ class HousekeepingTest : public ::testing::Test {
 
   std::shared_ptr<Session> Open(const std::string& id) {
     std::promise<Opened> opened;
-    registry_->Open(id, std::make_shared<std::atomic<bool>>(),
-                    [&opened](Opened session) { opened.set_value(std::move(session)); });
+    registry_->loader().Open(id, std::make_shared<std::atomic<bool>>(),
+                             [&opened](Opened session) { opened.set_value(std::move(session)); });
     Opened session = opened.get_future().get();
     EXPECT_THAT(session, IsOk());
     WaitForWorker();
@@ -113,8 +113,8 @@ class HousekeepingTest : public ::testing::Test {
   }
 
   void EvictAll() {
-    registry_->Evict([] { return false; });
-    catalog_->RemoveIdle(SessionRegistry::kInUse);
+    registry_->table().Evict([] { return false; });
+    catalog_->RemoveIdle(SessionTable::kInUse);
   }
 
   // Of a case of one byte; returns its name.
@@ -165,7 +165,7 @@ TEST_F(HousekeepingTest, WhatNobodyUsedForTheRetentionGoesAndNotASecondEarlier) 
   const Housekeeping::Removed removed = housekeeping_->RunOnce();
   EXPECT_EQ(removed.sessions, 1);
   EXPECT_THAT(Record("a"), StatusIs(absl::StatusCode::kNotFound));
-  EXPECT_FALSE(registry_->Knows("a"));
+  EXPECT_FALSE(registry_->table().Knows("a"));
   EXPECT_EQ(removed.meshes, 1) << "no session is made from it any longer";
   EXPECT_THAT(stores_->meshes().Find(mesh), StatusIs(absl::StatusCode::kNotFound));
   EXPECT_EQ(budget_.reserved_bytes(), 0);

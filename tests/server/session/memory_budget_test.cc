@@ -4,6 +4,8 @@
 #include "server/session/memory_budget.h"
 
 #include <atomic>
+#include <functional>
+#include <future>
 #include <string>
 #include <thread>
 #include <utility>
@@ -25,6 +27,34 @@ using ::tissueform::testing::IsOk;
 using ::tissueform::testing::StatusIs;
 
 constexpr int64_t kMebibyte = 1 << 20;
+
+// Answers shortages as long as it lives.
+class Reclaiming {
+ public:
+  using Reclaim = std::function<void(const MemoryBudget::Shortage& shortage)>;
+
+  Reclaiming(MemoryBudget* budget, Reclaim reclaim)
+      : budget_(budget), reclaim_(std::move(reclaim)) {
+    budget_->BeginReclaiming();
+    thread_ = std::thread([this] {
+      while (const auto shortage = budget_->WaitForShortage()) {
+        reclaim_(*shortage);
+        budget_->AnswerShortage();
+      }
+    });
+  }
+  ~Reclaiming() {
+    budget_->EndReclaiming();
+    thread_.join();
+  }
+  Reclaiming(const Reclaiming&) = delete;
+  Reclaiming& operator=(const Reclaiming&) = delete;
+
+ private:
+  MemoryBudget* const budget_;
+  const Reclaim reclaim_;
+  std::thread thread_;
+};
 
 TEST(MemoryBudgetTest, ReservationsAreGivenBackOnce) {
   MemoryBudget budget(100);
@@ -74,7 +104,8 @@ TEST(MemoryBudgetTest, ReclaimingMakesRoomForOneMoreTry) {
   MemoryBudget budget(100);
   MemoryReservation idle;
   int calls = 0;
-  budget.set_reclaimer([&](int64_t /*bytes*/) {
+  const Reclaiming reclaiming(&budget, [&](const MemoryBudget::Shortage& shortage) {
+    EXPECT_EQ(shortage.bytes, 90);
     ++calls;
     idle = MemoryReservation();
   });
@@ -83,6 +114,38 @@ TEST(MemoryBudgetTest, ReclaimingMakesRoomForOneMoreTry) {
   ASSERT_OK_AND_ASSIGN(const MemoryReservation fresh, budget.Reserve(90, "fresh"));
   EXPECT_EQ(calls, 1);
   EXPECT_EQ(budget.reserved_bytes(), 90);
+}
+
+TEST(MemoryBudgetTest, ReservationsThatAreShortAtTheSameTimeDoNotGetTheSameRoom) {
+  MemoryBudget budget(100);
+  std::vector<MemoryReservation> idle;
+  idle.push_back(*budget.Reserve(50, "idle"));
+  idle.push_back(*budget.Reserve(50, "idle"));
+  budget.BeginReclaiming();
+  const auto reserve = [&] { return budget.Reserve(50, "fresh"); };
+  auto first = std::async(std::launch::async, reserve);
+  auto second = std::async(std::launch::async, reserve);
+  for (int shortage = 0; shortage < 2; ++shortage) {
+    const int64_t bytes = budget.WaitForShortage()->bytes;
+    // No more than is needed.
+    while (!idle.empty() && budget.reserved_bytes() + bytes > budget.limit_bytes()) idle.pop_back();
+    budget.AnswerShortage();
+  }
+  EXPECT_THAT(first.get(), IsOk());
+  EXPECT_THAT(second.get(), IsOk());
+  budget.EndReclaiming();
+}
+
+TEST(MemoryBudgetTest, AReservationThatWaitsIsRefusedWhenReclaimingEnds) {
+  MemoryBudget budget(100);
+  budget.BeginReclaiming();
+  std::future<bool> reserved =
+      std::async(std::launch::async, [&] { return budget.Reserve(101, "too much").ok(); });
+  EXPECT_EQ(budget.WaitForShortage()->bytes, 101);
+  budget.EndReclaiming();
+  EXPECT_FALSE(reserved.get());
+  EXPECT_FALSE(budget.WaitForShortage().has_value());
+  EXPECT_FALSE(budget.Reserve(101, "too much").ok()) << "at once";
 }
 
 TEST(MemoryBudgetTest, ThreadsNeverTakeMoreThanThereIs) {
@@ -111,8 +174,9 @@ TEST(MemoryBudgetTest, ThreadsNeverTakeMoreThanThereIs) {
 TEST(MemoryBudgetTest, AnOwnerHasAPartOfTheWholeAndTakesNothingFromAnother) {
   MemoryBudget budget(100);
   std::vector<std::string> asked;
-  budget.set_account_limit(
-      60, [&](const std::string& owner, int64_t /*bytes*/) { asked.push_back(owner); });
+  budget.set_account_limit(60);
+  const Reclaiming reclaiming(
+      &budget, [&](const MemoryBudget::Shortage& shortage) { asked.push_back(shortage.owner); });
   MemoryBudget* one = budget.AccountOf("one");
   EXPECT_EQ(one, budget.AccountOf("one"));
   EXPECT_EQ(budget.AccountOf(""), &budget) << "nobody's share is the whole";
@@ -135,8 +199,9 @@ TEST(MemoryBudgetTest, AnOwnerHasAPartOfTheWholeAndTakesNothingFromAnother) {
 TEST(MemoryBudgetTest, WhatAnOwnerGivesBackMakesRoomForTheSameOwner) {
   MemoryBudget budget(100);
   MemoryReservation idle;
-  budget.set_account_limit(
-      60, [&](const std::string& /*owner*/, int64_t /*bytes*/) { idle = MemoryReservation(); });
+  budget.set_account_limit(60);
+  const Reclaiming reclaiming(
+      &budget, [&](const MemoryBudget::Shortage& /*shortage*/) { idle = MemoryReservation(); });
   MemoryBudget* one = budget.AccountOf("one");
   ASSERT_OK_AND_ASSIGN(idle, one->Reserve(40, "idle"));
   ASSERT_OK_AND_ASSIGN(const MemoryReservation fresh, one->Reserve(50, "fresh"));

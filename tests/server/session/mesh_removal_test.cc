@@ -84,17 +84,17 @@ class MeshRemovalTest : public ::testing::Test {
     auto promise = std::make_shared<std::promise<Made>>();
     SessionRecord record = BarRecord(*bar_);
     record.id = "a";
-    registry_.Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
-                     [promise](Made session) { promise->set_value(std::move(session)); });
+    registry_.loader().Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+                              [promise](Made session) { promise->set_value(std::move(session)); });
     return promise->get_future();
   }
   std::future<absl::Status> Delete() {
     auto promise = std::make_shared<std::promise<absl::Status>>();
-    registry_.Delete("a",
-                     [promise](absl::Status status) { promise->set_value(std::move(status)); });
+    registry_.sync().Delete(
+        "a", [promise](absl::Status status) { promise->set_value(std::move(status)); });
     return promise->get_future();
   }
-  absl::Status Remove() { return registry_.RemoveMesh(sha256_); }
+  absl::Status Remove() { return registry_.table().RemoveMesh(sha256_); }
   // On another thread.
   std::future<absl::Status> StartRemoving() {
     return std::async(std::launch::async, [this] { return catalog_.Remove(sha256_); });

@@ -30,7 +30,7 @@ class Node {
       : ownership(shared, name),
         store_(shared, name),
         registry(limits_, &budget_, pool_.get(), &store_, &catalog_, &clock, &ownership) {
-    registry.set_observer([this](const std::string& id, SessionEvent event) {
+    registry.table().set_observer([this](const std::string& id, SessionEvent event) {
       MutexLock lock(mutex_);
       if (event == SessionEvent::kMoved) moved_.push_back(id);
     });
@@ -47,38 +47,40 @@ class Node {
     SessionRecord record = BarRecord(*bar_);
     record.id = id;
     record.request_id = request_id;
-    return Wait<Opened>([&](const auto& done) { registry.Create(record, bar_, flag_, done); });
+    return Wait<Opened>(
+        [&](const auto& done) { registry.loader().Create(record, bar_, flag_, done); });
   }
   // Whoever waits for an answer does so no longer.
-  void Cancel() { registry.CancelWait(flag_); }
+  void Cancel() { registry.loader().CancelWait(flag_); }
   Opened Open(const std::string& id) {
-    return Wait<Opened>([&](const auto& done) { registry.Open(id, flag_, done); });
+    return Wait<Opened>([&](const auto& done) { registry.loader().Open(id, flag_, done); });
   }
   absl::Status Commit(const std::shared_ptr<Session>& session, double z) {
     HandlePose pose;
     pose.translation_mm.z() = z;
     return Wait<absl::Status>(
-        [&](const auto& done) { registry.CommitPoses(session, {pose}, done); });
+        [&](const auto& done) { registry.sync().CommitPoses(session, {pose}, done); });
   }
   absl::Status Update(const std::string& id) {
     const auto change = [](SessionRecord record, const StoredMesh& /*mesh*/) {
       record.project += "x";
       return record;
     };
-    using View = absl::StatusOr<SessionRegistry::View>;
-    return Wait<View>([&](const auto& done) { registry.Update(id, "", change, flag_, done); })
+    using View = absl::StatusOr<SessionView>;
+    return Wait<View>(
+               [&](const auto& done) { registry.loader().Update(id, "", change, flag_, done); })
         .status();
   }
   absl::Status Delete(const std::string& id) {
-    return Wait<absl::Status>([&](const auto& done) { registry.Delete(id, done); });
+    return Wait<absl::Status>([&](const auto& done) { registry.sync().Delete(id, done); });
   }
-  absl::StatusOr<SessionRegistry::View> Look(const std::string& id) {
-    return Wait<absl::StatusOr<SessionRegistry::View>>(
-        [&](const auto& done) { registry.Look(id, done); });
+  absl::StatusOr<SessionView> Look(const std::string& id) {
+    return Wait<absl::StatusOr<SessionView>>(
+        [&](const auto& done) { registry.sync().Look(id, done); });
   }
   int EvictAll() {
-    clock.Advance(2 * SessionRegistry::kInUse);
-    return registry.Evict([] { return false; });
+    clock.Advance(2 * SessionTable::kInUse);
+    return registry.table().Evict([] { return false; });
   }
   // Until workers have let go of what they have answered with, and what was given back by that is.
   void Settle() {
@@ -118,7 +120,7 @@ class Node {
   MemoryBudget budget_{64 << 20};
   MeshCatalog catalog_{limits_, &budget_, nullptr, &clock};
   SharedSessionStore store_;
-  const SessionRegistry::CancelFlag flag_ = std::make_shared<std::atomic<bool>>(false);
+  const SessionLoader::CancelFlag flag_ = std::make_shared<std::atomic<bool>>(false);
   std::unique_ptr<WorkerPool> pool_ = std::make_unique<WorkerPool>(1);
   std::shared_ptr<const StoredMesh> bar_;
 

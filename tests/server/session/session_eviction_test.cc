@@ -16,6 +16,7 @@
 #include "gtest/gtest.h"
 
 #include "core/base/error_reason.h"
+#include "server/session/memory_reclaimer.h"
 #include "server/session/session_registry.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/in_memory_stores.h"
@@ -52,19 +53,20 @@ class SessionEvictionTest : public ::testing::Test {
     pool_ = std::make_unique<WorkerPool>(1);
     registry_ = std::make_unique<SessionRegistry>(limits_, &budget_, pool_.get(), &store_,
                                                   &catalog_, &clock_);
-    ASSERT_THAT(registry_->LearnKnown(), IsOk());
+    ASSERT_THAT(registry_->sync().LearnAll(), IsOk());
   }
 
   // A session of that id; empty: the store's choice.
   std::future<Opened> Create(
       const std::string& id, const std::string& request_id = "",
-      SessionRegistry::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
+      SessionLoader::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
     SessionRecord record = BarRecord(*bar_);
     record.id = id;
     record.request_id = request_id;
     auto promise = std::make_shared<std::promise<Opened>>();
-    registry_->Create(std::move(record), bar_, std::move(cancelled),
-                      [promise](Opened session) { promise->set_value(std::move(session)); });
+    registry_->loader().Create(
+        std::move(record), bar_, std::move(cancelled),
+        [promise](Opened session) { promise->set_value(std::move(session)); });
     return promise->get_future();
   }
 
@@ -74,22 +76,24 @@ class SessionEvictionTest : public ::testing::Test {
     record.owner = owner;
     record.request_id = request_id;
     std::promise<Opened> promise;
-    registry_->Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
-                      [&promise](Opened session) { promise.set_value(std::move(session)); });
+    registry_->loader().Create(
+        std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+        [&promise](Opened session) { promise.set_value(std::move(session)); });
     return promise.get_future().get();
   }
 
-  std::future<Opened> Open(const std::string& id, SessionRegistry::CancelFlag cancelled =
+  std::future<Opened> Open(const std::string& id, SessionLoader::CancelFlag cancelled =
                                                       std::make_shared<std::atomic<bool>>()) {
     auto promise = std::make_shared<std::promise<Opened>>();
-    registry_->Open(id, std::move(cancelled),
-                    [promise](Opened session) { promise->set_value(std::move(session)); });
+    registry_->loader().Open(id, std::move(cancelled),
+                             [promise](Opened session) { promise->set_value(std::move(session)); });
     return promise->get_future();
   }
 
   absl::Status Delete(const std::string& id) {
     std::promise<absl::Status> done;
-    registry_->Delete(id, [&done](absl::Status status) { done.set_value(std::move(status)); });
+    registry_->sync().Delete(id,
+                             [&done](absl::Status status) { done.set_value(std::move(status)); });
     return done.get_future().get();
   }
 
@@ -100,7 +104,7 @@ class SessionEvictionTest : public ::testing::Test {
   }
 
   int EvictAll() {
-    return registry_->Evict([] { return false; });
+    return registry_->table().Evict([] { return false; });
   }
 
   // Holds the only batch worker until the result is set.
@@ -130,28 +134,29 @@ class SessionEvictionTest : public ::testing::Test {
 };
 
 TEST_F(SessionEvictionTest, WhatNobodyUsesIsWhatLeavingWouldGiveBack) {
-  EXPECT_EQ(registry_->EvictableBytes(), 0);
+  EXPECT_EQ(registry_->table().EvictableBytes(), 0);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create("first").get());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> second, Create("second").get());
   ASSERT_EQ(first->shared_preparation(), second->shared_preparation());
-  EXPECT_EQ(registry_->EvictableBytes(), 0) << "they were used until now";
-  clock_.Advance(2 * SessionRegistry::kInUse);
+  EXPECT_EQ(registry_->table().EvictableBytes(), 0) << "they were used until now";
+  clock_.Advance(2 * SessionTable::kInUse);
   second->Touch();
-  EXPECT_EQ(registry_->EvictableBytes(), first->own_bytes()) << "the other needs what they share";
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  EXPECT_EQ(registry_->EvictableBytes(), budget_.reserved_bytes() - mesh_bytes_);
+  EXPECT_EQ(registry_->table().EvictableBytes(), first->own_bytes())
+      << "the other needs what they share";
+  clock_.Advance(2 * SessionTable::kInUse);
+  EXPECT_EQ(registry_->table().EvictableBytes(), budget_.reserved_bytes() - mesh_bytes_);
   EXPECT_EQ(EvictAll(), 2);
-  EXPECT_EQ(registry_->EvictableBytes(), 0);
+  EXPECT_EQ(registry_->table().EvictableBytes(), 0);
 }
 
 TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameAnswers) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, Create("bar").get());
   const Positions answer = Answer(*before);
-  clock_.Advance(SessionRegistry::kInUse);
+  clock_.Advance(SessionTable::kInUse);
   EXPECT_EQ(EvictAll(), 0) << "it was used until now";
   clock_.Advance(std::chrono::nanoseconds(1));
   EXPECT_EQ(EvictAll(), 1);
-  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(registry_->table().size(), 0);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_) << "though somebody holds it";
   EXPECT_TRUE(before->evicted());
   EXPECT_THAT(before->Solve(before->model(), {HandlePose()}, {}),
@@ -160,7 +165,7 @@ TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameA
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> after, Open("bar").get());
   EXPECT_NE(after, before);
   EXPECT_EQ(Answer(*after), answer) << "to the last bit";
-  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(registry_->table().size(), 1);
   EXPECT_EQ(Open("bar").get().value(), after);
 }
 
@@ -191,12 +196,12 @@ TEST_F(SessionEvictionTest, ThoseUsedLongestAgoGoFirstAndNoMoreThanAreNeeded) {
     clock_.Advance(std::chrono::seconds(1));
   }
   ASSERT_THAT(Open("a").get(), IsOk());
-  clock_.Advance(2 * SessionRegistry::kInUse);
+  clock_.Advance(2 * SessionTable::kInUse);
   int asked = 0;
-  EXPECT_EQ(registry_->Evict([&asked] { return ++asked > 2; }), 2);
-  EXPECT_THAT(registry_->Find("a"), IsOk());
-  EXPECT_FALSE(registry_->Find("b").ok());
-  EXPECT_FALSE(registry_->Find("c").ok());
+  EXPECT_EQ(registry_->table().Evict([&asked] { return ++asked > 2; }), 2);
+  EXPECT_THAT(registry_->table().Find("a"), IsOk());
+  EXPECT_FALSE(registry_->table().Find("b").ok());
+  EXPECT_FALSE(registry_->table().Find("c").ok());
 }
 
 TEST_F(SessionEvictionTest, AFullServerMakesRoomByEvictionOrRefuses) {
@@ -204,24 +209,24 @@ TEST_F(SessionEvictionTest, AFullServerMakesRoomByEvictionOrRefuses) {
   ASSERT_THAT(Create("a").get(), IsOk());
   EXPECT_THAT(Create("b").get(),
               StatusIs(absl::StatusCode::kResourceExhausted, ::testing::HasSubstr("in use")));
-  clock_.Advance(2 * SessionRegistry::kInUse);
+  clock_.Advance(2 * SessionTable::kInUse);
   EXPECT_THAT(Create("b").get(), IsOk());
   EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kResourceExhausted));
-  clock_.Advance(2 * SessionRegistry::kInUse);
+  clock_.Advance(2 * SessionTable::kInUse);
   EXPECT_THAT(Open("a").get(), IsOk());
-  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(registry_->table().size(), 1);
 }
 
 TEST_F(SessionEvictionTest, ARestartKnowsItsSessionsAndTheirRequests) {
   ASSERT_THAT(Create("a", "request").get(), IsOk());
   Restart();
-  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(registry_->table().size(), 0);
   EXPECT_THAT(Create("a").get(), StatusIs(absl::StatusCode::kAlreadyExists));
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> again, Create("other", "request").get());
   EXPECT_EQ(again->id(), "a");
   // Its first owner has seen the name: who joined and went away does not take it along.
-  registry_->Abandon(again);
-  EXPECT_THAT(registry_->Find("a"), IsOk());
+  registry_->sync().Abandon(again);
+  EXPECT_THAT(registry_->table().Find("a"), IsOk());
   EXPECT_THAT(Delete("a"), IsOk());
   EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
 }
@@ -244,7 +249,7 @@ TEST_F(SessionEvictionTest, ACancelledOpenerIsAnsweredAtOnceAndTheOthersGetTheSe
   const auto cancelled = std::make_shared<std::atomic<bool>>();
   std::future<Opened> impatient = Open("a", cancelled);
   *cancelled = true;
-  registry_->CancelWait(cancelled);
+  registry_->loader().CancelWait(cancelled);
   EXPECT_THAT(impatient.get(), StatusIs(absl::StatusCode::kCancelled));
   std::future<Opened> patient = Open("a");  // joins what nobody waits for any longer
   release.set_value();
@@ -259,12 +264,12 @@ TEST_F(SessionEvictionTest, ACreationThatJoinedARestoreAndWasCancelledLeavesNoCl
   const auto cancelled = std::make_shared<std::atomic<bool>>();
   std::future<Opened> again = Create("other", "request", cancelled);
   *cancelled = true;
-  registry_->CancelWait(cancelled);
+  registry_->loader().CancelWait(cancelled);
   EXPECT_THAT(again.get(), StatusIs(absl::StatusCode::kCancelled));
   release.set_value();
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, patient.get());
   // The one claim that is left is that of the first creation.
-  registry_->Abandon(session);
+  registry_->sync().Abandon(session);
   EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
 }
 
@@ -272,9 +277,9 @@ TEST_F(SessionEvictionTest, ACreationThatJoinedARestoreAndWasAnsweredHasAClaim) 
   ASSERT_THAT(Create("a", "request").get(), IsOk());
   Restart();
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create("other", "request").get());
-  registry_->Abandon(session);
-  EXPECT_THAT(registry_->Find("a"), IsOk());
-  registry_->Abandon(session);
+  registry_->sync().Abandon(session);
+  EXPECT_THAT(registry_->table().Find("a"), IsOk());
+  registry_->sync().Abandon(session);
   EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
 }
 
@@ -303,15 +308,14 @@ TEST_F(SessionEvictionTest, CommittedPosesAreInTheRecord) {
   HandlePose pose;
   pose.translation_mm = {4, 5, 6};
   std::promise<absl::Status> committed;
-  registry_->CommitPoses(session, {pose}, [&committed](absl::Status status) {
+  registry_->sync().CommitPoses(session, {pose}, [&committed](absl::Status status) {
     committed.set_value(std::move(status));
   });
   EXPECT_THAT(committed.get_future().get(), IsOk());
-  std::promise<absl::StatusOr<SessionRegistry::View>> looked;
-  registry_->Look("a", [&looked](absl::StatusOr<SessionRegistry::View> view) {
-    looked.set_value(std::move(view));
-  });
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, looked.get_future().get());
+  std::promise<absl::StatusOr<SessionView>> looked;
+  registry_->sync().Look(
+      "a", [&looked](absl::StatusOr<SessionView> view) { looked.set_value(std::move(view)); });
+  ASSERT_OK_AND_ASSIGN(const SessionView view, looked.get_future().get());
   ASSERT_EQ(view.record.last_poses.size(), 1U);
   EXPECT_EQ(view.record.last_poses[0].translation_mm, pose.translation_mm);
 }
@@ -321,13 +325,36 @@ TEST_F(SessionEvictionTest, OneOwnersSessionsLeaveForItWithoutTouchingThoseOfOth
   ASSERT_THAT(CreateOf("bob"), IsOk());
   ASSERT_THAT(CreateOf("bob"), IsOk());
   clock_.Advance(std::chrono::hours(1));
-  EXPECT_EQ(registry_->Evict([] { return false; }, "bob"), 2);
-  EXPECT_EQ(registry_->size(), 1);
-  EXPECT_EQ(registry_->Evict([] { return false; }, "nobody"), 0);
+  EXPECT_EQ(registry_->table().Evict([] { return false; }, "bob"), 2);
+  EXPECT_EQ(registry_->table().size(), 1);
+  EXPECT_EQ(registry_->table().Evict([] { return false; }, "nobody"), 0);
+}
+
+TEST_F(SessionEvictionTest, AReservationThatDoesNotFitGetsTheRoomOfUnusedSessions) {
+  const MemoryReclaimer reclaimer(limits_, &budget_, registry_.get(), &catalog_);
+  ASSERT_THAT(Create("a").get(), IsOk());
+  const int64_t more = budget_.limit_bytes() - budget_.reserved_bytes() + 1;
+  EXPECT_THAT(budget_.Reserve(more, "mesh"), StatusIs(absl::StatusCode::kResourceExhausted));
+  EXPECT_EQ(registry_->table().size(), 1) << "it is in use";
+  clock_.Advance(2 * SessionTable::kInUse);
+  EXPECT_THAT(budget_.Reserve(more, "mesh"), IsOk());
+  EXPECT_EQ(registry_->table().size(), 0);
+  EXPECT_THAT(Open("a").get(), IsOk());
+}
+
+TEST_F(SessionEvictionTest, AReservationOfAnOwnerGetsTheRoomOfThatOwnersSessions) {
+  constexpr int64_t kAccount = 16 << 20;
+  budget_.set_account_limit(kAccount);
+  const MemoryReclaimer reclaimer(limits_, &budget_, registry_.get(), &catalog_);
+  ASSERT_THAT(CreateOf("ann"), IsOk());
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> of_bob, CreateOf("bob"));
+  clock_.Advance(2 * SessionTable::kInUse);
+  EXPECT_THAT(budget_.AccountOf("ann")->Reserve(kAccount, "session"), IsOk());
+  EXPECT_EQ(registry_->table().Loaded(), std::vector{of_bob});
 }
 
 TEST_F(SessionEvictionTest, AnOwnerHasNoMoreSessionsThanTheQuotaAndOthersAreNotBothered) {
-  registry_->set_most_of_owner(2);
+  registry_->table().set_max_of_owner(2);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, CreateOf("ann", "first"));
   ASSERT_THAT(CreateOf("ann"), IsOk());
   const Opened third = CreateOf("ann");
@@ -344,7 +371,7 @@ TEST_F(SessionEvictionTest, AnOwnerHasNoMoreSessionsThanTheQuotaAndOthersAreNotB
 TEST_F(SessionEvictionTest, SessionsOfEarlierServersCountForTheirOwner) {
   ASSERT_THAT(CreateOf("ann"), IsOk());
   Restart();
-  registry_->set_most_of_owner(1);
+  registry_->table().set_max_of_owner(1);
   EXPECT_THAT(CreateOf("ann"), StatusIs(absl::StatusCode::kResourceExhausted));
   EXPECT_THAT(CreateOf("bob"), IsOk());
 }

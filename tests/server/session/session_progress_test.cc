@@ -111,7 +111,7 @@ class SessionProgressTest : public ::testing::Test {
 
   std::future<Made> Create(SessionRecord record, const TellSession& tell) {
     auto promise = std::make_shared<std::promise<Made>>();
-    registry_.Create(
+    registry_.loader().Create(
         std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
         [promise](Made made) { promise->set_value(std::move(made)); }, tell);
     return promise->get_future();
@@ -196,16 +196,14 @@ TEST_F(SessionProgressTest, UpdatesAndRestoresTellThatTheyRead) {
   ASSERT_THAT(Create(record, nullptr).get(), IsOk());
   Heard updated;
   std::promise<absl::Status> update;
-  registry_.Update(
+  registry_.loader().Update(
       "a", "",
       [](SessionRecord changed, const StoredMesh& /*mesh*/) {
         changed.stiffness = 500.0;
         return absl::StatusOr<SessionRecord>(std::move(changed));
       },
       std::make_shared<std::atomic<bool>>(),
-      [&update](const absl::StatusOr<SessionRegistry::View>& view) {
-        update.set_value(view.status());
-      },
+      [&update](const absl::StatusOr<SessionView>& view) { update.set_value(view.status()); },
       updated.Teller());
   ASSERT_THAT(update.get_future().get(), IsOk());
   const auto expected = [](std::optional<SessionStage> last) {
@@ -216,14 +214,14 @@ TEST_F(SessionProgressTest, UpdatesAndRestoresTellThatTheyRead) {
     return stages;
   };
   EXPECT_EQ(updated.Stages(), expected(SessionStage::kKeeping));
-  clock_.Advance(2 * SessionRegistry::kInUse);
+  clock_.Advance(2 * SessionTable::kInUse);
   std::promise<void> drained;
   pool_->Post(Lane::kBatch, [&drained] { drained.set_value(); });
   drained.get_future().wait();
-  ASSERT_EQ(registry_.Evict([] { return false; }), 1);
+  ASSERT_EQ(registry_.table().Evict([] { return false; }), 1);
   Heard restored;
   std::promise<Made> opened;
-  registry_.Open(
+  registry_.loader().Open(
       "a", std::make_shared<std::atomic<bool>>(),
       [&opened](Made session) { opened.set_value(std::move(session)); }, restored.Teller());
   ASSERT_THAT(opened.get_future().get(), IsOk());

@@ -15,6 +15,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "server/session/memory_reclaimer.h"
 #include "tests/testing/fake_clock.h"
 #include "tests/testing/in_memory_stores.h"
 #include "tests/testing/meshes.h"
@@ -64,6 +65,7 @@ class SessionRegistryTest : public ::testing::Test {
 
   void Restart(const ServiceLimits& limits, int64_t budget_bytes = 64 << 20) {
     pool_.reset();
+    reclaimer_.reset();
     registry_.reset();
     bar_.reset();
     catalog_.reset();
@@ -72,26 +74,29 @@ class SessionRegistryTest : public ::testing::Test {
     pool_ = std::make_unique<WorkerPool>(1);
     registry_ = std::make_unique<SessionRegistry>(limits, budget_.get(), pool_.get(), &store_,
                                                   catalog_.get(), &clock_);
-    budget_->set_reclaimer([this](int64_t /*bytes*/) { registry_->RemoveIdle(); });
+    reclaimer_ =
+        std::make_unique<MemoryReclaimer>(limits, budget_.get(), registry_.get(), catalog_.get());
     bar_ = Store(SampleMesh(Bar({2, 2, 3})), catalog_.get());
     mesh_bytes_ = budget_->reserved_bytes();
   }
 
-  std::future<CreateResult> Create(const Key& key = {}, SessionRegistry::CancelFlag cancelled =
+  std::future<CreateResult> Create(const Key& key = {}, SessionLoader::CancelFlag cancelled =
                                                             std::make_shared<std::atomic<bool>>()) {
     auto promise = std::make_shared<std::promise<CreateResult>>();
     SessionRecord record = BarRecord(*bar_);
     record.id = key.session_id;
     record.request_id = key.request_id;
     record.request_fingerprint = key.fingerprint;
-    registry_->Create(std::move(record), bar_, std::move(cancelled),
-                      [promise](CreateResult result) { promise->set_value(std::move(result)); });
+    registry_->loader().Create(
+        std::move(record), bar_, std::move(cancelled),
+        [promise](CreateResult result) { promise->set_value(std::move(result)); });
     return promise->get_future();
   }
 
   absl::Status Delete(const std::string& id) {
     std::promise<absl::Status> done;
-    registry_->Delete(id, [&done](absl::Status status) { done.set_value(std::move(status)); });
+    registry_->sync().Delete(id,
+                             [&done](absl::Status status) { done.set_value(std::move(status)); });
     return done.get_future().get();
   }
 
@@ -120,6 +125,7 @@ class SessionRegistryTest : public ::testing::Test {
   std::unique_ptr<MeshCatalog> catalog_;
   std::unique_ptr<WorkerPool> pool_;
   std::unique_ptr<SessionRegistry> registry_;
+  std::unique_ptr<MemoryReclaimer> reclaimer_;
   std::shared_ptr<const StoredMesh> bar_;
   int64_t mesh_bytes_ = 0;
 };
@@ -131,12 +137,12 @@ TEST_F(SessionRegistryTest, ReservesWhatTheSessionHoldsAndFreesItOnDelete) {
     id = session->id();
     EXPECT_GT(session->bytes_held(), session->preparation().factor_bytes);
     EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + session->bytes_held());
-    EXPECT_THAT(registry_->Find(id), IsOk());
+    EXPECT_THAT(registry_->table().Find(id), IsOk());
     // A holder does not keep the memory.
     EXPECT_THAT(Delete(id), IsOk());
     EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
   }
-  EXPECT_THAT(registry_->Find(id), StatusIs(absl::StatusCode::kNotFound, HasSubstr(id)));
+  EXPECT_THAT(registry_->table().Find(id), StatusIs(absl::StatusCode::kNotFound, HasSubstr(id)));
   EXPECT_THAT(Delete(id), StatusIs(absl::StatusCode::kNotFound, HasSubstr(id)));
 }
 
@@ -202,7 +208,7 @@ TEST_F(SessionRegistryTest, ConcurrentCallsWithOneRequestIdShareTheWork) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> one, first.get());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> two, second.get());
   EXPECT_EQ(one, two);
-  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(registry_->table().size(), 1);
 }
 
 TEST_F(SessionRegistryTest, ACancelledCreationLeavesNothingBehind) {
@@ -214,7 +220,7 @@ TEST_F(SessionRegistryTest, ACancelledCreationLeavesNothingBehind) {
   go.set_value();
   EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("cancel")));
   Drain();
-  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(registry_->table().size(), 0);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
 }
 
@@ -224,14 +230,14 @@ TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItE
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
   std::future<CreateResult> result = Create({"id", "print", "chosen"}, cancelled);
   *cancelled = true;
-  registry_->CancelWait(cancelled);
+  registry_->loader().CancelWait(cancelled);
   // The worker has not begun.
   EXPECT_THAT(result.get(), StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
   EXPECT_THAT(Create({"", "", "chosen"}).get(), StatusIs(absl::StatusCode::kAlreadyExists))
       << "another request must wait";
   go.set_value();
   Drain();
-  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(registry_->table().size(), 0);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
   EXPECT_THAT(Create({"id", "print", "chosen"}).get(), IsOk());
@@ -242,13 +248,13 @@ TEST_F(SessionRegistryTest, ARepeatedRequestJoinsWhatIsGivenUpBeforeItHasStopped
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   const auto cancelled = std::make_shared<std::atomic<bool>>(true);
   std::future<CreateResult> gone = Create({"id", "print", "chosen"}, cancelled);
-  registry_->CancelWait(cancelled);
+  registry_->loader().CancelWait(cancelled);
   EXPECT_THAT(gone.get(), StatusIs(absl::StatusCode::kCancelled));
   std::future<CreateResult> again = Create({"id", "print", "chosen"});
   go.set_value();
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, again.get());
   Drain();
-  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(registry_->table().size(), 1);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + session->bytes_held());
   EXPECT_THAT(Stored(), ::testing::ElementsAre("chosen"));
 }
@@ -260,31 +266,31 @@ TEST_F(SessionRegistryTest, ARepeatedRequestTakesUpWhatWasCancelledInTheSameStag
   SessionRecord record = BarRecord(*bar_);
   record.request_id = "id";
   record.request_fingerprint = "print";
-  registry_->Create(
+  registry_->loader().Create(
       record, bar_, cancelled,
       [&first](CreateResult result) { first.set_value(std::move(result)); },
       [&](const SessionProgress& progress) {
         if (progress.stage != SessionStage::kOrdering) return;
         *cancelled = true;
-        registry_->CancelWait(cancelled);
+        registry_->loader().CancelWait(cancelled);
         // On this very worker: it goes on to its next stage afterwards.
         again = Create({"id", "print", ""});
       });
   EXPECT_THAT(first.get_future().get(), StatusIs(absl::StatusCode::kCancelled));
   Drain();
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, again.get());
-  EXPECT_EQ(registry_->size(), 1);
+  EXPECT_EQ(registry_->table().size(), 1);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + session->bytes_held());
 }
 
 TEST_F(SessionRegistryTest, ASessionThatNobodyWaitsForAnyMoreEndsThoughItIsMade) {
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
   // After its last stage: too late to stop early.
-  store_.before_create = [&] { registry_->CancelWait(cancelled); };
+  store_.before_create = [&] { registry_->loader().CancelWait(cancelled); };
   EXPECT_THAT(Create({}, cancelled).get(),
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("canceled")));
   Drain();
-  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(registry_->table().size(), 0);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
 }
@@ -298,10 +304,10 @@ TEST_F(SessionRegistryTest, OneCancelledCallerDoesNotSpoilItForTheOther) {
   go.set_value();
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, gone.get());
   ASSERT_THAT(stays.get(), IsOk());
-  registry_->Abandon(session);  // what the cancelled call does at its end
-  EXPECT_THAT(registry_->Find(session->id()), IsOk());
-  registry_->Abandon(session);
-  EXPECT_THAT(registry_->Find(session->id()),
+  registry_->sync().Abandon(session);  // what the cancelled call does at its end
+  EXPECT_THAT(registry_->table().Find(session->id()), IsOk());
+  registry_->sync().Abandon(session);
+  EXPECT_THAT(registry_->table().Find(session->id()),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("it was deleted")));
   Drain();
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
@@ -325,7 +331,7 @@ TEST_F(SessionRegistryTest, AnIdleSessionMakesRoomForANewOne) {
   Restart(limits);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> held, Create().get());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> fresh, Create().get());
-  EXPECT_THAT(registry_->Find(held->id()),
+  EXPECT_THAT(registry_->table().Find(held->id()),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("idle")));
   Drain();
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + fresh->bytes_held());
@@ -344,16 +350,16 @@ TEST_F(SessionRegistryTest, IdleSessionsMakeRoomWhenMemoryIsShort) {
   const int64_t free_bytes = budget_->limit_bytes() - budget_->reserved_bytes();
   ASSERT_OK_AND_ASSIGN(const MemoryReservation all,
                        budget_->Reserve(free_bytes + 1, "all there is and one byte"));
-  EXPECT_FALSE(registry_->Find(first_id).ok());
+  EXPECT_FALSE(registry_->table().Find(first_id).ok());
 }
 
 TEST_F(SessionRegistryTest, SessionsWithinTheirTtlStay) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
-  EXPECT_EQ(registry_->RemoveIdle(), 0);
+  EXPECT_EQ(registry_->sync().RemoveIdle(), 0);
   const int64_t free_bytes = budget_->limit_bytes() - budget_->reserved_bytes();
   EXPECT_THAT(budget_->Reserve(free_bytes + 1, "mesh"),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("mesh")));
-  EXPECT_THAT(registry_->Find(session->id()), IsOk());
+  EXPECT_THAT(registry_->table().Find(session->id()), IsOk());
 }
 
 TEST_F(SessionRegistryTest, ASessionIsIdleFromTheEndOfItsTtlAndNotBefore) {
@@ -364,28 +370,29 @@ TEST_F(SessionRegistryTest, ASessionIsIdleFromTheEndOfItsTtlAndNotBefore) {
   }
   Drain();
   clock_.Advance(kTtl - kTick);
-  EXPECT_EQ(registry_->RemoveIdle(), 0) << "just before";
+  EXPECT_EQ(registry_->sync().RemoveIdle(), 0) << "just before";
   clock_.Advance(kTick);
-  EXPECT_EQ(registry_->RemoveIdle(), 1) << "just after";
-  EXPECT_THAT(registry_->Find(id), StatusIs(absl::StatusCode::kNotFound, HasSubstr("idle")));
+  EXPECT_EQ(registry_->sync().RemoveIdle(), 1) << "just after";
+  EXPECT_THAT(registry_->table().Find(id),
+              StatusIs(absl::StatusCode::kNotFound, HasSubstr("idle")));
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
 }
 
 TEST_F(SessionRegistryTest, WhoeverAsksForASessionKeepsIt) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
   clock_.Advance(kTtl - kTick);
-  EXPECT_THAT(registry_->Find(session->id()), IsOk());
+  EXPECT_THAT(registry_->table().Find(session->id()), IsOk());
   clock_.Advance(kTtl - kTick);
-  EXPECT_EQ(registry_->RemoveIdle(), 0);
+  EXPECT_EQ(registry_->sync().RemoveIdle(), 0);
   clock_.Advance(kTick);
-  EXPECT_EQ(registry_->RemoveIdle(), 1);
+  EXPECT_EQ(registry_->sync().RemoveIdle(), 1);
 }
 
 TEST_F(SessionRegistryTest, AClientMayChooseTheId) {
   const std::string id = "my-session-of-2026-11-22";
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create({"", "", id}).get());
   EXPECT_EQ(session->id(), id);
-  EXPECT_THAT(registry_->Find(id), IsOk());
+  EXPECT_THAT(registry_->table().Find(id), IsOk());
   EXPECT_THAT(Create({"", "", id}).get(),
               StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("session_id")));
   ASSERT_THAT(Delete(id), IsOk());
@@ -407,7 +414,8 @@ TEST_F(SessionRegistryTest, AnIdUnderDeletionIsNeitherThereNorFreeAndTheMessageS
   std::promise<void> go;
   pool_->Post(Lane::kSolves, [&go] { go.get_future().wait(); });
   std::promise<absl::Status> deleted;
-  registry_->Delete("chosen", [&](absl::Status status) { deleted.set_value(std::move(status)); });
+  registry_->sync().Delete("chosen",
+                           [&](absl::Status status) { deleted.set_value(std::move(status)); });
   EXPECT_THAT(Create({"", "", "chosen"}).get(),
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("being deleted")));
   go.set_value();
@@ -419,9 +427,9 @@ TEST_F(SessionRegistryTest, ALateAbandonLeavesTheNextSessionOfTheIdAlone) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create({"", "", "chosen"}).get());
   ASSERT_THAT(Delete("chosen"), IsOk());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> second, Create({"", "", "chosen"}).get());
-  registry_->Abandon(first);
+  registry_->sync().Abandon(first);
   Drain();
-  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> found, registry_->Find("chosen"));
+  ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> found, registry_->table().Find("chosen"));
   EXPECT_EQ(found, second);
   EXPECT_THAT(Stored(), ::testing::ElementsAre("chosen"));
 }
@@ -451,7 +459,7 @@ TEST_F(SessionRegistryTest, TheStoreHoldsTheRecordsOfTheSessionsThatLive) {
   EXPECT_THAT(Stored(), ::testing::ElementsAre("b"));
   Drain();
   clock_.Advance(kTtl);
-  EXPECT_EQ(registry_->RemoveIdle(), 1);
+  EXPECT_EQ(registry_->sync().RemoveIdle(), 1);
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
 }
 
@@ -460,7 +468,7 @@ TEST_F(SessionRegistryTest, WhatCannotBeMadeOrIsAbandonedLeavesNoRecord) {
   EXPECT_FALSE(Create({}, cancelled).get().ok());
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
-  registry_->Abandon(session);
+  registry_->sync().Abandon(session);
   Drain();
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
 }
@@ -473,7 +481,7 @@ TEST_F(SessionRegistryTest, AnIdThatTheStoreHasAlreadyIsRefusedAndLeavesNothing)
   EXPECT_THAT(Create({"", "", "chosen"}).get(),
               StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("chosen")));
   Drain();
-  EXPECT_EQ(registry_->size(), 0);
+  EXPECT_EQ(registry_->table().size(), 0);
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
   EXPECT_THAT(Stored(), ::testing::ElementsAre("chosen"));
 }

@@ -4,6 +4,7 @@
 // Sessions that are updated (server/session/session_registry.h).
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <future>
 #include <memory>
@@ -34,7 +35,29 @@ using testing::StatusIs;
 using testing::Store;
 
 using Opened = absl::StatusOr<std::shared_ptr<Session>>;
-using Updated = absl::StatusOr<SessionRegistry::View>;
+using Updated = absl::StatusOr<SessionView>;
+
+// Lets a test do something in the middle of a write.
+class WatchedStore : public InMemorySessionStore {
+ public:
+  void Get(const std::string& id, RecordCallback done) override {
+    ++reads;
+    InMemorySessionStore::Get(id, std::move(done));
+  }
+  void Update(SessionRecord record, int64_t epoch, RecordCallback done) override {
+    if (before_update) before_update();
+    InMemorySessionStore::Update(std::move(record), epoch, std::move(done));
+  }
+  void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
+                   StatusCallback done) override {
+    if (before_commit) std::exchange(before_commit, nullptr)();
+    InMemorySessionStore::CommitPoses(id, std::move(poses), epoch, std::move(done));
+  }
+
+  std::atomic<int> reads = 0;
+  std::function<void()> before_update;
+  std::function<void()> before_commit;
+};
 
 class SessionUpdateTest : public ::testing::Test {
  protected:
@@ -44,16 +67,16 @@ class SessionUpdateTest : public ::testing::Test {
     SessionRecord record = BarRecord(*bar_);
     record.id = "a";
     std::promise<Opened> made;
-    registry_.Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
-                     [&made](Opened session) { made.set_value(std::move(session)); });
+    registry_.loader().Create(std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
+                              [&made](Opened session) { made.set_value(std::move(session)); });
     first_ = made.get_future().get().value();
   }
   ~SessionUpdateTest() override { pool_.reset(); }
 
   std::shared_ptr<Session> Open() {
     std::promise<Opened> opened;
-    registry_.Open("a", std::make_shared<std::atomic<bool>>(),
-                   [&opened](Opened session) { opened.set_value(std::move(session)); });
+    registry_.loader().Open("a", std::make_shared<std::atomic<bool>>(),
+                            [&opened](Opened session) { opened.set_value(std::move(session)); });
     Opened session = opened.get_future().get();
     EXPECT_THAT(session, IsOk());
     return session.value_or(nullptr);
@@ -67,9 +90,9 @@ class SessionUpdateTest : public ::testing::Test {
 
   std::future<Updated> Update(
       const std::string& etag, std::function<void(SessionRecord*)> change,
-      SessionRegistry::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
+      SessionLoader::CancelFlag cancelled = std::make_shared<std::atomic<bool>>()) {
     auto promise = std::make_shared<std::promise<Updated>>();
-    registry_.Update(
+    registry_.loader().Update(
         "a", etag,
         [change = std::move(change)](SessionRecord record, const StoredMesh& /*mesh*/) {
           change(&record);
@@ -79,11 +102,15 @@ class SessionUpdateTest : public ::testing::Test {
     return promise->get_future();
   }
 
+  std::future<absl::Status> StartCommit(const std::shared_ptr<Session>& session,
+                                        const HandlePose& pose) {
+    auto done = std::make_shared<std::promise<absl::Status>>();
+    registry_.sync().CommitPoses(
+        session, {pose}, [done](absl::Status status) { done->set_value(std::move(status)); });
+    return done->get_future();
+  }
   absl::Status Commit(const std::shared_ptr<Session>& session, const HandlePose& pose) {
-    std::promise<absl::Status> done;
-    registry_.CommitPoses(session, {pose},
-                          [&done](absl::Status status) { done.set_value(std::move(status)); });
-    return done.get_future().get();
+    return StartCommit(session, pose).get();
   }
 
   static void Soften(SessionRecord* record) { record->stiffness = 500.0; }
@@ -98,7 +125,7 @@ class SessionUpdateTest : public ::testing::Test {
   ServiceLimits limits_;
   MemoryBudget budget_{64 << 20};
   MeshCatalog catalog_{limits_, &budget_, nullptr, &clock_};
-  InMemorySessionStore store_;
+  WatchedStore store_;
   std::unique_ptr<WorkerPool> pool_ = std::make_unique<WorkerPool>(1);
   SessionRegistry registry_{limits_, &budget_, pool_.get(), &store_, &catalog_, &clock_};
   std::shared_ptr<const StoredMesh> bar_;
@@ -108,10 +135,9 @@ class SessionUpdateTest : public ::testing::Test {
 
 TEST_F(SessionUpdateTest, TheNameStaysAndTheRestIsWhatIsAskedFor) {
   const SessionRecord before = Record();
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view,
-                       Update(before.etag, [](SessionRecord* record) {
-                         record->model = DeformationModel::kLinearElastic;
-                       }).get());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, Update(before.etag, [](SessionRecord* record) {
+                                                 record->model = DeformationModel::kLinearElastic;
+                                               }).get());
   EXPECT_EQ(view.session->model(), DeformationModel::kLinearElastic);
   EXPECT_EQ(view.session, Open());
   EXPECT_EQ(Record().model, DeformationModel::kLinearElastic);
@@ -186,12 +212,43 @@ TEST_F(SessionUpdateTest, PosesThatAreCommittedWhileItIsPreparedAreKept) {
   std::future<Updated> updated = Update("", Soften);
   EXPECT_THAT(Commit(first_, Moved(7)), IsOk());
   go.set_value();
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, updated.get());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, updated.get());
   ASSERT_EQ(view.record.last_poses.size(), 1U);
   EXPECT_EQ(view.record.last_poses[0].translation_mm.x(), 7);
   // A stream that has not noticed yet; its poses still fit.
   EXPECT_THAT(Commit(first_, Moved(8)), IsOk());
   EXPECT_EQ(Record().last_poses[0].translation_mm.x(), 8);
+}
+
+TEST_F(SessionUpdateTest, AnUpdateDoesNotReadBeforeTheStoreHasACommitThatCameFirst) {
+  std::future<Updated> updated;
+  store_.before_commit = [&] {
+    updated = Update("", Soften);
+    // The update has read the record, to change it. If it did not wait for this commit, it would
+    // read it once more well within this time; a slow machine does not fail the test.
+    const int reads = store_.reads;
+    EXPECT_EQ(updated.wait_for(std::chrono::milliseconds(100)), std::future_status::timeout);
+    EXPECT_EQ(store_.reads, reads);
+  };
+  EXPECT_THAT(Commit(first_, Moved(7)), IsOk());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, updated.get());
+  ASSERT_EQ(view.record.last_poses.size(), 1U);
+  EXPECT_EQ(view.record.last_poses[0].translation_mm.x(), 7);
+}
+
+TEST_F(SessionUpdateTest, ACommitInTheMiddleOfAnUpdateComesAfterIt) {
+  std::future<absl::Status> committed;
+  store_.before_update = [&] {
+    committed = StartCommit(first_, Moved(7));
+    EXPECT_EQ(committed.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  };
+  ASSERT_THAT(Update("", Soften).get(), IsOk());
+  EXPECT_THAT(committed.get(), IsOk());
+  ASSERT_EQ(Record().last_poses.size(), 1U);
+  EXPECT_EQ(Record().last_poses[0].translation_mm.x(), 7);
+  ASSERT_THAT(Update("", Rename).get(), IsOk());
+  EXPECT_TRUE(HasReason(committed.get(), ErrorReason::kSessionUpdated));
+  EXPECT_TRUE(Record().last_poses.empty()) << "they are of handles that are gone";
 }
 
 TEST_F(SessionUpdateTest, OtherHandlesBeginAtRestAndTakeNoPosesOfTheOldOnes) {
@@ -206,17 +263,17 @@ TEST_F(SessionUpdateTest, OtherHandlesBeginAtRestAndTakeNoPosesOfTheOldOnes) {
 }
 
 TEST_F(SessionUpdateTest, WhoHoldsAnEvictedOneLearnsOfTheUpdate) {
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  ASSERT_EQ(registry_.Evict([] { return false; }), 1);
+  clock_.Advance(2 * SessionTable::kInUse);
+  ASSERT_EQ(registry_.table().Evict([] { return false; }), 1);
   EXPECT_FALSE(first_->updated());
   ASSERT_THAT(Update("", Soften).get(), IsOk());
   EXPECT_TRUE(first_->updated());
-  EXPECT_EQ(registry_.size(), 1);
+  EXPECT_EQ(registry_.table().size(), 1);
 }
 
 TEST_F(SessionUpdateTest, AnOpenerWhoCameBeforeTheUpdateGetsTheUpdatedSession) {
-  clock_.Advance(2 * SessionRegistry::kInUse);
-  ASSERT_EQ(registry_.Evict([] { return false; }), 1);
+  clock_.Advance(2 * SessionTable::kInUse);
+  ASSERT_EQ(registry_.table().Evict([] { return false; }), 1);
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   // In this order on the worker: the update's work, then the restore of the record before it.
@@ -225,13 +282,13 @@ TEST_F(SessionUpdateTest, AnOpenerWhoCameBeforeTheUpdateGetsTheUpdatedSession) {
   pool_->Post(Lane::kStore, [&asked] { asked.set_value(); });
   asked.get_future().wait();
   std::promise<Opened> opened;
-  registry_.Open("a", std::make_shared<std::atomic<bool>>(),
-                 [&opened](Opened session) { opened.set_value(std::move(session)); });
+  registry_.loader().Open("a", std::make_shared<std::atomic<bool>>(),
+                          [&opened](Opened session) { opened.set_value(std::move(session)); });
   std::promise<void> read;
   pool_->Post(Lane::kStore, [&read] { read.set_value(); });
   read.get_future().wait();
   go.set_value();
-  ASSERT_OK_AND_ASSIGN(const SessionRegistry::View view, updated.get());
+  ASSERT_OK_AND_ASSIGN(const SessionView view, updated.get());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, opened.get_future().get());
   EXPECT_EQ(session, view.session);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_ + session->bytes_held());
@@ -242,11 +299,11 @@ TEST_F(SessionUpdateTest, WhatIsDeletedMeanwhileStaysDeleted) {
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   std::future<Updated> updated = Update("", Soften);
   std::promise<absl::Status> deleted;
-  registry_.Delete("a", [&](absl::Status status) { deleted.set_value(std::move(status)); });
+  registry_.sync().Delete("a", [&](absl::Status status) { deleted.set_value(std::move(status)); });
   EXPECT_THAT(deleted.get_future().get(), IsOk());
   go.set_value();
   EXPECT_THAT(updated.get(), StatusIs(absl::StatusCode::kNotFound));
-  EXPECT_EQ(registry_.size(), 0);
+  EXPECT_EQ(registry_.table().size(), 0);
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_);
 }
 
