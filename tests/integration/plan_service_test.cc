@@ -224,8 +224,13 @@ TEST_F(PlanServiceTest, BadRequestsAreRefusedInALineThatNamesTheCulprit) {
 }
 
 TEST_F(PlanServiceTest, ACallThatNobodyWaitsForAnyLongerEndsAndLeavesTheSessionAsItWas) {
-  EXPECT_THAT(Fit(Wanted(SomePose(1)), std::chrono::milliseconds(1)),
-              StatusIs(absl::StatusCode::kDeadlineExceeded));
+  // A fit may be done in time; not so many.
+  constexpr int kMaxFits = 50;
+  absl::Status status;
+  for (int fit = 0; fit < kMaxFits && status.ok(); ++fit) {
+    status = Fit(Wanted(SomePose(1)), std::chrono::milliseconds(1)).status();
+  }
+  EXPECT_THAT(status, StatusIs(absl::StatusCode::kDeadlineExceeded));
   EXPECT_THAT(Fit(Wanted(SomePose(1))), IsOk());
 }
 
