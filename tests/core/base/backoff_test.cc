@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/cpp/backoff.h"
+#include "core/base/backoff.h"
 
 #include "gtest/gtest.h"
 
