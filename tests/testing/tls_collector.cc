@@ -6,12 +6,12 @@
 #include <array>
 #include <chrono>
 #include <cstdlib>
-#include <netinet/in.h>
-#include <openssl/ssl.h>
 #include <poll.h>
 #include <unistd.h>
 
 #include "absl/strings/numbers.h"
+#include <netinet/in.h>
+#include <openssl/ssl.h>
 #include <sys/socket.h>
 
 namespace tissueform::testing {

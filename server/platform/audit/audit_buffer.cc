@@ -3,10 +3,10 @@
 
 #include "server/platform/audit/audit_buffer.h"
 
+#include <cstddef>
 #include <fcntl.h>
 #include <filesystem>
 #include <limits>
-#include <cstddef>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -36,8 +36,7 @@ absl::StatusOr<std::unique_ptr<AuditBuffer>> AuditBuffer::Open(const std::string
   TF_RETURN_IF_ERROR(database->Execute(kTable));
   std::unique_ptr<AuditBuffer> buffer(new AuditBuffer(std::move(database), max_bytes));
   MutexLock lock(buffer->mutex_);
-  TF_ASSIGN_OR_RETURN(buffer->bytes_,
-                      buffer->BytesUpTo(std::numeric_limits<int64_t>::max()));
+  TF_ASSIGN_OR_RETURN(buffer->bytes_, buffer->BytesUpTo(std::numeric_limits<int64_t>::max()));
   return buffer;
 }
 
@@ -61,8 +60,9 @@ absl::Status AuditBuffer::Append(std::deque<std::string>* messages) {
   bytes_ += bytes;
   messages->erase(messages->begin(), messages->begin() + static_cast<std::ptrdiff_t>(count));
   if (messages->empty()) return absl::OkStatus();
-  return absl::ResourceExhaustedError(absl::StrCat(
-      "audit buffer ", database_->path(), ": full; start the collector or raise --audit-buffer-mib"));
+  return absl::ResourceExhaustedError(
+      absl::StrCat("audit buffer ", database_->path(),
+                   ": full; start the collector or raise --audit-buffer-mib"));
 }
 
 absl::Status AuditBuffer::Insert(const std::deque<std::string>& messages, size_t count) {

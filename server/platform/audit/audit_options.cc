@@ -61,7 +61,8 @@ void AddAuditOptions(CLI::App& app, const std::string& folder, AuditOptions* opt
                      "TLS; if neither takes them, audited work is refused")
           ->check(CLI::Validator(CheckTarget, "journal|syslog://HOST:PORT"))
           ->type_name("");
-  AddPemOption(app, {"--audit-ca", "authorities of the collector's certificate, PEM (default: the "
+  AddPemOption(app, {"--audit-ca",
+                     "authorities of the collector's certificate, PEM (default: the "
                      "system's)",
                      &options->authorities})
       ->needs(audit);

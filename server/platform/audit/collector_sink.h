@@ -41,8 +41,9 @@ class CollectorSink final : public AuditSink {
     std::string buffer_file;
     int64_t max_buffer_bytes = int64_t{256} << 20;
     std::chrono::milliseconds settle_time{1000};
-    std::chrono::milliseconds patience{10'000};  // a collector that reads nothing for longer is left
-    std::chrono::milliseconds last_time{2000};   // for what waits when the program ends
+    std::chrono::milliseconds patience{
+        10'000};                                // a collector that reads nothing for longer is left
+    std::chrono::milliseconds last_time{2000};  // for what waits when the program ends
     Backoff::Options backoff = {.first = std::chrono::milliseconds(100),
                                 .most = std::chrono::seconds(10)};
   };
@@ -81,12 +82,12 @@ class CollectorSink final : public AuditSink {
   const std::unique_ptr<AuditBuffer> buffer_;
 
   // The thread's.
-  std::unique_ptr<TlsStream> stream_;   // null: not connected
-  int64_t sent_ = 0;                    // number of the last message of this connection
-  int64_t removed_ = 0;                 // number of the last message that was removed
-  int64_t settling_ = 0;                // these are removed at settled_at_; 0: none
+  std::unique_ptr<TlsStream> stream_;  // null: not connected
+  int64_t sent_ = 0;                   // number of the last message of this connection
+  int64_t removed_ = 0;                // number of the last message that was removed
+  int64_t settling_ = 0;               // these are removed at settled_at_; 0: none
   Clock::time_point settled_at_ = {};
-  bool is_failing_ = false;             // the log says so
+  bool is_failing_ = false;  // the log says so
 
   std::atomic<bool> stopping_ = false;  // ends what blocks
   mutable Mutex mutex_;

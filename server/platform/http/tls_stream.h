@@ -22,9 +22,9 @@ namespace tissueform {
 class TlsStream {
  public:
   struct Peer {
-    std::string host;      // the name, or the address, that its certificate must have
+    std::string host;  // the name, or the address, that its certificate must have
     int port = 0;
-    TlsFiles files = {};   // read at each connection; without authorities the system's count
+    TlsFiles files = {};  // read at each connection; without authorities the system's count
     std::chrono::seconds connect_time{10};
     const std::atomic<bool>* stopping = nullptr;  // ends Connect and Send within a second
   };

@@ -18,17 +18,17 @@
 
 #include "core/base/error_reason.h"
 #include "server/platform/audit/audit_log.h"
-#include "tests/testing/recording_sink.h"
+#include "tests/testing/audit_recorder.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
 namespace {
 
+using testing::AuditRecord;
+using testing::AuditRecorder;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using testing::IsOk;
-using testing::RecordingSink;
-using testing::SinkRecord;
 
 class AuditObserverTest : public ::testing::Test {
  protected:
@@ -37,7 +37,7 @@ class AuditObserverTest : public ::testing::Test {
   void Start(AuditLog::Options options) {
     observer_.reset();
     options.retry = std::chrono::milliseconds(1);
-    log_.emplace(std::make_unique<RecordingSink>(&record_), options);
+    log_.emplace(std::make_unique<AuditRecorder>(&record_), options);
     observer_.emplace(&*log_, [this] { return now_; });
   }
 
@@ -75,7 +75,7 @@ class AuditObserverTest : public ::testing::Test {
 
   Principal principal_ = {.name = "planner@example.org"};
   absl::Time now_ = absl::FromUnixSeconds(1'700'000'000);
-  SinkRecord record_;
+  AuditRecord record_;
   std::optional<AuditLog> log_;
   std::optional<AuditObserver> observer_;
 };

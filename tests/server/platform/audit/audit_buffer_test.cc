@@ -90,7 +90,8 @@ TEST_F(AuditBufferTest, TakesWhatFitsAndNamesItsOption) {
 
 TEST_F(AuditBufferTest, OneProcessHoldsIt) {
   const auto buffer = Open();
-  EXPECT_THAT(AuditBuffer::Open(path_, 1000), StatusIs(absl::StatusCode::kUnavailable, HasSubstr(path_)));
+  EXPECT_THAT(AuditBuffer::Open(path_, 1000),
+              StatusIs(absl::StatusCode::kUnavailable, HasSubstr(path_)));
 }
 
 TEST_F(AuditBufferTest, IsItsOwnersAlone) {

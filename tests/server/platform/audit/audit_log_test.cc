@@ -15,16 +15,16 @@
 #include "gtest/gtest.h"
 
 #include "core/base/error_reason.h"
-#include "tests/testing/recording_sink.h"
+#include "tests/testing/audit_recorder.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
 namespace {
 
+using testing::AuditRecord;
+using testing::AuditRecorder;
 using ::testing::ElementsAre;
 using testing::IsOk;
-using testing::RecordingSink;
-using testing::SinkRecord;
 
 class AuditLogTest : public ::testing::Test {
  protected:
@@ -32,14 +32,14 @@ class AuditLogTest : public ::testing::Test {
 
   void Start(AuditLog::Options options) {
     options.retry = std::chrono::milliseconds(1);
-    log_.emplace(std::make_unique<RecordingSink>(&record_), options);
+    log_.emplace(std::make_unique<AuditRecorder>(&record_), options);
   }
   void Write(const std::string& message) {
     ASSERT_THAT(log_->Reserve(1), IsOk());
     log_->Write(message);
   }
 
-  SinkRecord record_;
+  AuditRecord record_;
   std::optional<AuditLog> log_;
 };
 

@@ -40,10 +40,9 @@ TEST(AuditOptions, NamesTheJournalOrACollector) {
         "syslog://192.0.2.1:6514", "syslog://[2001:db8::1]", "syslog://[2001:db8::1]:6514"}) {
     EXPECT_TRUE(Parses(target)) << target;
   }
-  for (const char* target :
-       {"audit.jsonl", "syslog", "syslog://", "syslog://:6514", "syslog://a:0", "syslog://a:65536",
-        "syslog://a:b", "syslog://a/b", "syslog://a b", "syslog://[2001:db8::1", "syslog://u@a",
-        "https://a", "Journal"}) {
+  for (const char* target : {"audit.jsonl", "syslog", "syslog://", "syslog://:6514", "syslog://a:0",
+                             "syslog://a:65536", "syslog://a:b", "syslog://a/b", "syslog://a b",
+                             "syslog://[2001:db8::1", "syslog://u@a", "https://a", "Journal"}) {
     EXPECT_FALSE(Parses(target)) << target;
   }
 }

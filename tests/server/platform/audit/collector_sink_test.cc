@@ -51,14 +51,13 @@ class CollectorSinkTest : public ::testing::Test {
   }
 
   CollectorSink::Options Options() const {
-    return {.host = "localhost",
-            .port = port_,
-            .tls = {.certificate = own_.certificate,
-                    .key = own_.key,
-                    .authorities = identity_.roots},
-            .buffer_file = (folder_ / "buffer.db").string(),
-            .settle_time = milliseconds(50),
-            .backoff = {.first = milliseconds(5), .most = milliseconds(20)}};
+    return {
+        .host = "localhost",
+        .port = port_,
+        .tls = {.certificate = own_.certificate, .key = own_.key, .authorities = identity_.roots},
+        .buffer_file = (folder_ / "buffer.db").string(),
+        .settle_time = milliseconds(50),
+        .backoff = {.first = milliseconds(5), .most = milliseconds(20)}};
   }
   void StartSink() { StartSink(Options()); }
   void StartSink(const CollectorSink::Options& options) {
@@ -102,8 +101,7 @@ class CollectorSinkTest : public ::testing::Test {
   }
 
   const fs::path folder_ = testing::EmptyTestFolder(
-      std::string("collector_") +
-      ::testing::UnitTest::GetInstance()->current_test_info()->name());
+      std::string("collector_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
   const TestAuthority authority_;
   const TestFiles identity_ = authority_.IssueFiles(folder_, "collector");
   const TestFiles own_ = authority_.IssueFiles(folder_, "own", {.name = "planning-server"});

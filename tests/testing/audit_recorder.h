@@ -15,8 +15,8 @@
 
 namespace tissueform::testing {
 
-// What a RecordingSink has taken, and whether it takes more. Thread-safe.
-class SinkRecord {
+// What a AuditRecorder has taken, and whether it takes more. Thread-safe.
+class AuditRecord {
  public:
   std::vector<std::string> messages() const {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -46,14 +46,14 @@ class SinkRecord {
   size_t limit_ = static_cast<size_t>(-1);
 };
 
-class RecordingSink final : public AuditSink {
+class AuditRecorder final : public AuditSink {
  public:
   // `record` must outlive it.
-  explicit RecordingSink(SinkRecord* record) : record_(record) {}
+  explicit AuditRecorder(AuditRecord* record) : record_(record) {}
   absl::Status Take(std::deque<std::string>* messages) override { return record_->Take(messages); }
 
  private:
-  SinkRecord* const record_;
+  AuditRecord* const record_;
 };
 
 }  // namespace tissueform::testing

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Runs the ten commands of docs/operations.md as they stand, in a scratch folder, and looks at what they leave.
+"""Runs the first commands of docs/operations.md as they stand, in a scratch folder, and looks at what they leave.
 
-    tests/integration/ten_commands.py FOLDER_OF_PROGRAMS
+    tests/integration/first_commands.py FOLDER_OF_PROGRAMS
 
 Each of them succeeds; the server speaks TLS to openssl; nobody else may read what is secret, and no log, no metric and
 no printed configuration holds it. Where a port is taken they end with the reason; run again in the same folder they succeed,
@@ -25,8 +25,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "deploy"))
 from free_ports import free_ports
 
-HEADING = "## From nothing to a monitored server in ten commands"
-COMMANDS = 10
+HEADING = "## From nothing to a monitored server in nine commands"
+COMMANDS = 9
 PATIENCE_S = 100
 
 
@@ -35,7 +35,7 @@ def block():
     found = re.search(re.escape(HEADING) + r"\n.*?```sh\n(.*?)```", page, flags=re.DOTALL)
     assert found, "docs/operations.md has no block of commands"
     text = found.group(1)
-    assert re.findall(r"^# (\d+)\. ", text, flags=re.MULTILINE) == [str(n + 1) for n in range(COMMANDS)], "not ten commands"
+    assert re.findall(r"^# (\d+)\. ", text, flags=re.MULTILINE) == [str(n + 1) for n in range(COMMANDS)], "not nine commands"
     return text
 
 
@@ -45,12 +45,12 @@ def check(condition, what):
 
 
 def secrets(folder):
-    """What must be nowhere else: lines of keys, the token, the key of the audit log."""
+    """What must be nowhere else: lines of keys, the token."""
     return [(folder / "token").read_text().strip(), *kept_secrets(folder)]
 
 
 def kept_secrets(folder):
-    found = [(folder / "audit.key").read_text().strip()]
+    found = []
     for name in ("ca.key", "server.key", "keys/private.pem"):
         found += [line for line in (folder / name).read_text().splitlines() if line and not line.startswith("-----")]
     return found
@@ -91,9 +91,9 @@ def look(folder, programs, port, metrics_port, runs):
     check("token-keys = keys/jwks.json\n" in printed, "the configuration prints as it was given")
     metrics = urllib.request.urlopen(f"http://127.0.0.1:{metrics_port}/metrics", timeout=PATIENCE_S).read().decode()
     check("tissueform_" in metrics, "Prometheus finds metrics")
-    told = printed + metrics + "".join((folder / name).read_text() for name in ("server.log", "server.out", "audit.jsonl"))
-    check(not [secret for secret in secrets(folder) if secret in told], "no secret is in logs, metrics, audit or configuration")
-    for name in ("token", "audit.key", "keys/private.pem", "ca.key", "server.key", "data"):
+    told = printed + metrics + "".join((folder / name).read_text() for name in ("server.log", "server.out"))
+    check(not [secret for secret in secrets(folder) if secret in told], "no secret is in logs, metrics or configuration")
+    for name in ("token", "keys/private.pem", "ca.key", "server.key", "data"):
         check((folder / name).stat().st_mode & 0o077 == 0, f"{name} is its owner's alone")
     tls = subprocess.run(["openssl", "s_client", "-connect", f"localhost:{port}", "-CAfile", "ca.pem", "-verify_return_error", "-verify_hostname", "localhost", "-alpn", "h2"],
                          cwd=folder, input="", capture_output=True, text=True, errors="replace", timeout=PATIENCE_S)  # HTTP/2 may come, too
@@ -112,7 +112,7 @@ def main(programs):
             keys = None
             for again in range(2):
                 code, told = run(folder, programs, port, metrics_port)
-                check(code == 0, f"ten commands succeed{' again' if again else ''}" if code == 0 else told)
+                check(code == 0, f"the commands succeed{' again' if again else ''}" if code == 0 else told)
                 look(folder, programs, port, metrics_port, backups + again + 1)
                 check(keys in (None, kept_secrets(folder)), "keys are as they were")
                 keys = kept_secrets(folder)
