@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""The audit events of the real server, read by programs that are not ours.
+"""The audit events of the real programs, read by programs that are not ours.
 
   audit_of_program.py collector SERVER TISSUEFORM    rsyslog receives them over TLS
   audit_of_program.py journal SERVER TISSUEFORM      systemd-journald keeps them, journalctl prints them
+  audit_of_program.py bridge TISSUEFORM_PACS         storescu sends to the bridge, rsyslog receives its DICOM audit messages, and
+                                                     xmllint checks them against the schema
 
 The journal's part runs in namespaces of its own, in which journald has an empty /run. Exit code 77: a program is missing, or
 the machine allows no such namespaces.
@@ -14,6 +16,7 @@ import contextlib
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import socket
@@ -24,6 +27,15 @@ import time
 
 PATIENCE_S = 60
 JOURNALD = "/lib/systemd/systemd-journald"
+SCHEMA = pathlib.Path(__file__).resolve().parents[1] / "client/pacs_bridge/audit/audit_message.rng"
+OBJECT = """
+(0008,0016) UI [1.2.840.10008.5.1.4.1.1.2]
+(0008,0018) UI [1.2.3.3]
+(0010,0010) PN [Planted^Patricia]
+(0010,0020) LO [PLANTED-4711]
+(0020,000d) UI [1.2.3.1]
+(0020,000e) UI [1.2.3.2]
+"""
 TEMPLATE = """
 template(name="events" type="list" option.jsonf="on") {
   property(outname="pri" name="pri" format="jsonf")
@@ -107,10 +119,10 @@ action(type="omfile" file="{self.events_file}" template="events")
             return True
         return False
 
-    def events(self):
-        """Those of calls."""
+    def events(self, program="tissueform-server"):
+        """All but rsyslog's own."""
         lines = self.events_file.read_text().splitlines() if self.events_file.exists() else []
-        return [event for event in map(json.loads, lines) if event["app"] == "tissueform-server"]
+        return [event for event in map(json.loads, lines) if event["app"] == program]
 
 
 def make_certificates(folder):
@@ -166,6 +178,35 @@ def look_at_collector(programs, folder):
     end(collector.process)
 
 
+def look_at_bridge(program, folder):
+    make_certificates(folder)
+    collector = Rsyslog(folder)
+    bridge = start(program, "listen", "--state-dir", folder / "state", "--listen", "127.0.0.1:0", "--allow-ae", "SCANNER", "--log-level", "warn",
+                   "--audit", f"syslog://localhost:{collector.port}", "--audit-ca", folder / "ca.pem",
+                   "--dicom-cert", folder / "server.pem", "--dicom-key", folder / "server.key", "--dicom-ca", folder / "ca.pem", stdout=subprocess.PIPE, text=True)
+    port = bridge.stdout.readline().strip().rsplit(":", 1)[1]
+    (folder / "object.txt").write_text(OBJECT)
+    subprocess.run(["dump2dcm", folder / "object.txt", folder / "object.dcm"], check=True, capture_output=True)
+    sent = subprocess.run(["storescu", "--enable-tls", folder / "collector.key", folder / "collector.pem", "--add-cert-file", folder / "ca.pem", "-aet", "SCANNER",
+                           "-aec", "TISSUEFORM", "localhost", port, folder / "object.dcm"], capture_output=True, text=True, check=False)
+    check(sent.returncode == 0, "storescu sends", sent.stderr)
+    check(end(bridge) == 0, "the bridge ends")
+    wait_for("rsyslog has four messages", lambda: len(collector.events("tissueform-pacs")) == 4)
+    events = collector.events("tissueform-pacs")
+    check({(event["id"], event["pri"]) for event in events} == {("DICOM+RFC3881", "85")}, "with the header of a DICOM audit message", events)
+    for number, event in enumerate(events):
+        (folder / f"{number}.xml").write_text(event["text"])
+    schema = subprocess.run(["xmllint", "--noout", "--relaxng", SCHEMA, *(folder / f"{number}.xml" for number in range(4))], capture_output=True, text=True, check=False)
+    check(schema.returncode == 0, "xmllint finds them right", schema.stderr)
+    codes = [re.findall(r'<Event(?:ID|TypeCode) csd-code="(\d+)"', event["text"]) for event in events]
+    check(codes == [["110100", "110120"], ["110102"], ["110104"], ["110100", "110121"]], "start, begin, transferred, stop", codes)
+    transferred = events[2]["text"]
+    check('ParticipantObjectID="1.2.3.1"' in transferred and 'ParticipantObjectID="PLANTED-4711"' in transferred and 'UserID="SCANNER"' in transferred,
+          "with study, patient ID and sender", transferred)
+    check("Patricia" not in "".join(event["text"] for event in events), "and without the patient's name")
+    end(collector.process)
+
+
 def look_at_refusals(programs, folder):
     for options, reason in ((("--audit-log", "audit.jsonl"), "--audit-log: removed; give --audit journal or --audit syslog://HOST:PORT"),
                             (("--audit-syslog",), "--audit-syslog: removed; give"),
@@ -211,7 +252,8 @@ def look_at_journal(programs, folder):
 
 def main():
     kind, programs = sys.argv[1], sys.argv[2:]
-    needed = {"collector": ["/usr/sbin/rsyslogd", "openssl"], "journal": [JOURNALD, "journalctl", "unshare"]}[kind]
+    needed = {"bridge": ["/usr/sbin/rsyslogd", "openssl", "dump2dcm", "storescu", "xmllint"], "collector": ["/usr/sbin/rsyslogd", "openssl"],
+              "journal": [JOURNALD, "journalctl", "unshare"]}[kind]
     if any(shutil.which(program) is None for program in needed):
         print(f"missing: one of {needed}; deploy/packages.txt lists them")
         sys.exit(77)
@@ -226,6 +268,8 @@ def main():
         try:
             if kind == "journal":
                 look_at_journal(programs, folder)
+            elif kind == "bridge":
+                look_at_bridge(programs[0], folder)
             else:
                 look_at_refusals(programs, folder)
                 look_at_collector(programs, folder)
