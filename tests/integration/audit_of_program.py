@@ -145,7 +145,6 @@ def sequence(event):
 def look_at_collector(programs, folder):
     make_certificates(folder)
     collector = Rsyslog(folder)
-    # The calls of `tissueform` come over plain TCP: the server's certificate is for the collector only.
     options = ("--audit", f"syslog://localhost:{collector.port}", "--audit-ca", folder / "ca.pem")
     identity = ("--tls-cert", folder / "server.pem", "--tls-key", folder / "server.key")
     server = Server(programs, folder, *options, *identity)

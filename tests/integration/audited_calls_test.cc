@@ -1,7 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -17,7 +16,6 @@
 #include "tests/integration/service_test.h"
 #include "tests/testing/journal_socket.h"
 #include "tests/testing/status_matchers.h"
-#include "tests/testing/test_authority.h"
 #include "tissueform/v1/session_service.grpc.pb.h"
 
 // What the journal receives of a server's calls, and what the server refuses without one.
@@ -52,11 +50,7 @@ class AuditedCallsTest : public ServiceTest {
     return calls_;
   }
 
-  const std::string socket_ =
-      (EmptyTestFolder(absl::StrCat(
-           "audited_", ::testing::UnitTest::GetInstance()->current_test_info()->name())) /
-       "journal")
-          .string();
+  const std::string socket_ = NewSocketPath();
   std::optional<JournalSocket> journal_;
   std::map<std::string, int> calls_;
 };

@@ -42,7 +42,7 @@ class PlantedSecretsTest : public ServiceTest {
   void SetUp() override {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    journal_.emplace((folder_ / "journal").string());
+    journal_.emplace(socket_);
     before_ = spdlog::default_logger();
     auto logger = std::make_shared<spdlog::logger>(
         "server", std::make_shared<spdlog::sinks::ostream_sink_mt>(log_));
@@ -53,7 +53,7 @@ class PlantedSecretsTest : public ServiceTest {
     options.in_memory = false;
     options.data_dir = folder_ / "kept";
     options.telemetry.metrics_port = 0;
-    options.telemetry.audit = {.target = "journal", .journal_socket = folder_ / "journal"};
+    options.telemetry.audit = {.target = "journal", .journal_socket = socket_};
     StartServer(options);
   }
   void TearDown() override { spdlog::set_default_logger(before_); }
@@ -102,6 +102,7 @@ class PlantedSecretsTest : public ServiceTest {
       fs::path(::testing::TempDir()) /
       absl::StrCat("planted_secrets_",
                    ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  const std::string socket_ = NewSocketPath();
   std::optional<JournalSocket> journal_;
   std::string audit_;
   std::ostringstream log_;

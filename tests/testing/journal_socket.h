@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -17,6 +18,12 @@
 #include <sys/un.h>
 
 namespace tissueform::testing {
+
+// A path for a socket, of this process's own. Short: a socket's path has at most 107 bytes.
+inline std::string NewSocketPath() {
+  static std::atomic<int> count = 0;
+  return "/tmp/tissueform_" + std::to_string(getpid()) + "_" + std::to_string(++count);
+}
 
 // In place of journald: a datagram socket at a path of the test's own, which is read when asked.
 class JournalSocket {

@@ -55,7 +55,11 @@ KindCodes CodesOf(AuditEvent::Kind kind) {
 uint32_t TakeCodePoint(absl::string_view* text) {
   const auto first = static_cast<unsigned char>(text->front());
   text->remove_prefix(1);
-  const int more = first < 0x80 ? 0 : first >= 0xF0 ? 3 : first >= 0xE0 ? 2 : first >= 0xC0 ? 1 : -1;
+  const int more = first < 0x80    ? 0
+                   : first >= 0xF0 ? 3
+                   : first >= 0xE0 ? 2
+                   : first >= 0xC0 ? 1
+                                   : -1;
   if (more < 0 || text->size() < static_cast<size_t>(more)) return '?';
   uint32_t point = more == 0 ? first : first & (0x3FU >> more);
   for (int i = 0; i < more; ++i) {
@@ -112,8 +116,8 @@ std::string Identification(const AuditEvent& event) {
 // PS3.15 A.5.1: 1 a machine's name, 2 an IP address, 5 a URI.
 const char* HostType(const std::string& host) {
   if (absl::StrContains(host, "://")) return "5";
-  const bool is_address = host.find_first_not_of("0123456789.") == std::string::npos ||
-                          absl::StrContains(host, ':');
+  const bool is_address =
+      host.find_first_not_of("0123456789.") == std::string::npos || absl::StrContains(host, ':');
   return is_address ? "2" : "1";
 }
 

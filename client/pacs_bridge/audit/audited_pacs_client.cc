@@ -4,10 +4,11 @@
 #include "client/pacs_bridge/audit/audited_pacs_client.h"
 
 #include <array>
-#include <dcmtk/dcmdata/dctk.h>
-#include <dcmtk/dcmdata/dcostrmb.h>
 #include <map>
 #include <utility>
+
+#include <dcmtk/dcmdata/dcostrmb.h>
+#include <dcmtk/dcmdata/dctk.h>
 
 #include "client/pacs_bridge/dicom/instance_header.h"
 #include "core/base/status_macros.h"

@@ -36,8 +36,8 @@ absl::Status AuditedSink::Begin(const ReceivedInstance& instance) {
     }
     transfers[{study.study_uid, study.patient_id}] = {.kept = study, .refused = study};
   }
-  audit_->Write(EventOf(AuditEvent::Kind::kTransferBegin, study, instance.calling_ae,
-                        instance.address));
+  audit_->Write(
+      EventOf(AuditEvent::Kind::kTransferBegin, study, instance.calling_ae, instance.address));
   return absl::OkStatus();
 }
 

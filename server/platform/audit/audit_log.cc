@@ -132,7 +132,8 @@ void AuditLog::WriteBatch() {
   waiting_.insert(waiting_.begin(), std::make_move_iterator(batch.begin()),
                   std::make_move_iterator(batch.end()));
   if (!status.ok() && !counts_.failing) {
-    spdlog::error("{}; audited work is refused until they can be written", std::string(status.message()));
+    spdlog::error("{}; audited work is refused until they can be written",
+                  std::string(status.message()));
   } else if (status.ok() && counts_.failing) {
     spdlog::info("the audit log is writable again");
   }

@@ -49,17 +49,16 @@ TEST(AuditMessage, ATransferNamesBothSidesTheStudyAndThePatient) {
 }
 
 TEST(AuditMessage, EveryKindFollowsTheSchema) {
-  for (const auto kind :
-       {AuditEvent::Kind::kApplicationStart, AuditEvent::Kind::kApplicationStop,
-        AuditEvent::Kind::kQuery, AuditEvent::Kind::kTransferBegin, AuditEvent::Kind::kTransferred,
-        AuditEvent::Kind::kNodeRefused}) {
+  for (const auto kind : {AuditEvent::Kind::kApplicationStart, AuditEvent::Kind::kApplicationStop,
+                          AuditEvent::Kind::kQuery, AuditEvent::Kind::kTransferBegin,
+                          AuditEvent::Kind::kTransferred, AuditEvent::Kind::kNodeRefused}) {
     for (const absl::Status& outcome : {absl::OkStatus(), absl::UnavailableError("is <away>")}) {
       AuditEvent event = TransferEvent();
       event.kind = kind;
       event.outcome = outcome;
       event.query = std::string("\x08\x00\0\xff", 4);
-      event.participants.push_back({.user_id = "https://pacs.example/dicom-web",
-                                    .host = "https://pacs.example/dicom-web"});
+      event.participants.push_back(
+          {.user_id = "https://pacs.example/dicom-web", .host = "https://pacs.example/dicom-web"});
       const std::string message = ToAuditMessage(event);
       EXPECT_EQ(SchemaErrors(message), "") << message;
       EXPECT_EQ(ValuesOf(message, "//EventOutcomeDescription"), outcome.ok() ? "" : "is <away>");
@@ -78,9 +77,14 @@ TEST(AuditMessage, WhatIsMissingIsLeftOut) {
 TEST(AuditMessage, TextsFromOutsideStayTexts) {
   const std::vector<std::pair<std::string, std::string>> texts = {
       {"\"/><AuditMessage a='&lt;", "\"/><AuditMessage a='&lt;"},
-      {"M\xc3\xbcller \xe6\x9d\xb1 \xf0\x9f\xa6\xb7", "M\xc3\xbcller \xe6\x9d\xb1 \xf0\x9f\xa6\xb7"},
-      {std::string("a\0b\nc\x1b" "d\x7f", 8), "a?b?c?d\x7f"},
-      {"\xff\xc3(\xed\xa0\x80\xf5\x90\x80\x80\xef\xbf\xbf", std::string(2, '?') + "(" + std::string(3, '?')},
+      {"M\xc3\xbcller \xe6\x9d\xb1 \xf0\x9f\xa6\xb7",
+       "M\xc3\xbcller \xe6\x9d\xb1 \xf0\x9f\xa6\xb7"},
+      {std::string("a\0b\nc\x1b"
+                   "d\x7f",
+                   8),
+       "a?b?c?d\x7f"},
+      {"\xff\xc3(\xed\xa0\x80\xf5\x90\x80\x80\xef\xbf\xbf",
+       std::string(2, '?') + "(" + std::string(3, '?')},
       {"\xe6\x9d", std::string(2, '?')},
       {std::string(1000, 'x'), std::string(256, 'x')}};
   for (const auto& [text, expected] : texts) {

@@ -3,8 +3,6 @@
 
 #include "client/pacs_bridge/audit/audited_pacs_client.h"
 
-#include <dcmtk/dcmdata/dctk.h>
-#include <dcmtk/dcmdata/dcistrmb.h>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -13,6 +11,8 @@
 #include "absl/strings/escaping.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <dcmtk/dcmdata/dcistrmb.h>
+#include <dcmtk/dcmdata/dctk.h>
 
 #include "core/base/error_reason.h"
 #include "tests/client/pacs_bridge/audit/schema_check.h"
@@ -25,9 +25,9 @@ namespace tissueform {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::ElementsAre;
 using testing::AuditRecord;
 using testing::AuditRecorder;
+using ::testing::ElementsAre;
 using testing::IsOk;
 using testing::SchemaErrors;
 using testing::StatusIs;
@@ -66,9 +66,9 @@ class FakePacs final : public PacsClient {
     std::vector<StoredObject> stored;
     for (const std::string& path : paths) {
       const bool refuses = static_cast<int>(stored.size()) >= takes;
-      stored.push_back({.path = path,
-                        .status = refuses ? absl::FailedPreconditionError("status 0xa700")
-                                          : absl::OkStatus()});
+      stored.push_back(
+          {.path = path,
+           .status = refuses ? absl::FailedPreconditionError("status 0xa700") : absl::OkStatus()});
     }
     return stored;
   }
@@ -91,9 +91,9 @@ class AuditedPacsClientTest : public ::testing::Test {
     audit_ = *std::move(audit);
     auto fake = std::make_unique<FakePacs>();
     fake_ = fake.get();
-    pacs_ = MakeAuditedPacsClient(
-        audit_.get(), {.host = "pacs.example.org", .port = 104, .ae_title = "PACS"},
-        std::move(fake));
+    pacs_ = MakeAuditedPacsClient(audit_.get(),
+                                  {.host = "pacs.example.org", .port = 104, .ae_title = "PACS"},
+                                  std::move(fake));
     series_ = testing::WriteCtSeries(folder_, {.slices = 3});
     fake_->header = series_.files[0];
   }
@@ -119,9 +119,9 @@ class AuditedPacsClientTest : public ::testing::Test {
     return events;
   }
 
-  const fs::path folder_ = testing::EmptyTestFolder(
-      std::string("audited_pacs_") +
-      ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  const fs::path folder_ =
+      testing::EmptyTestFolder(std::string("audited_pacs_") +
+                               ::testing::UnitTest::GetInstance()->current_test_info()->name());
   AuditRecord record_;
   std::unique_ptr<BridgeAudit> audit_;
   FakePacs* fake_ = nullptr;
@@ -183,10 +183,9 @@ TEST_F(AuditedPacsClientTest, WhatIsStoredBeginsAndEnds) {
   EXPECT_THAT(pacs_->Store(series_.files), IsOk());
   fake_->answer = absl::UnavailableError("gone");
   EXPECT_THAT(pacs_->Store(series_.files), StatusIs(absl::StatusCode::kUnavailable));
-  EXPECT_THAT(Events(),
-              ElementsAre("110102 0 3", "110104 0 3",                 //
-                          "110102 0 3", "110104 0 2", "110104 8 1",   //
-                          "110102 0 3", "110104 8 3"));
+  EXPECT_THAT(Events(), ElementsAre("110102 0 3", "110104 0 3",                //
+                                    "110102 0 3", "110104 0 2", "110104 8 1",  //
+                                    "110102 0 3", "110104 8 3"));
 }
 
 TEST_F(AuditedPacsClientTest, ARefusalIsASecurityAlert) {

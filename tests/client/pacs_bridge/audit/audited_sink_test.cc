@@ -19,9 +19,9 @@
 namespace tissueform {
 namespace {
 
-using ::testing::HasSubstr;
 using testing::AuditRecord;
 using testing::AuditRecorder;
+using ::testing::HasSubstr;
 using testing::IsOk;
 using testing::SchemaErrors;
 using testing::StatusIs;
@@ -85,8 +85,8 @@ class AuditedSinkTest : public ::testing::Test {
 TEST_F(AuditedSinkTest, AStudyHasOneBeginAndOneEnd) {
   for (int i = 0; i < 3; ++i) EXPECT_THAT(Keep(7, "1.2", "4711"), IsOk());
   End(7);
-  EXPECT_THAT(Events(), ::testing::ElementsAre("110100 0  ", "110102 0 1.2,4711 ",
-                                               "110104 0 1.2,4711 3"));
+  EXPECT_THAT(Events(),
+              ::testing::ElementsAre("110100 0  ", "110102 0 1.2,4711 ", "110104 0 1.2,4711 3"));
   EXPECT_EQ(counting_.kept, 3);
   EXPECT_EQ(counting_.ended_count, 1);
 }
@@ -107,8 +107,8 @@ TEST_F(AuditedSinkTest, WhatIsRefusedIsAnEventOfItsOwn) {
   counting_.answer = absl::AlreadyExistsError("other bytes");
   EXPECT_THAT(Keep(1, "1.2", "A"), StatusIs(absl::StatusCode::kAlreadyExists));
   End(1);
-  EXPECT_THAT(Events(), ::testing::ElementsAre("110100 0  ", "110102 0 1.2,A ",
-                                               "110104 0 1.2,A 1", "110104 8 1.2,A 1"));
+  EXPECT_THAT(Events(), ::testing::ElementsAre("110100 0  ", "110102 0 1.2,A ", "110104 0 1.2,A 1",
+                                               "110104 8 1.2,A 1"));
 }
 
 TEST_F(AuditedSinkTest, WhileTheAuditTakesNothingNothingIsReceived) {

@@ -4,10 +4,11 @@
 #include "tests/client/pacs_bridge/audit/schema_check.h"
 
 #include <cstdlib>
+#include <memory>
+
 #include <libxml/parser.h>
 #include <libxml/relaxng.h>
 #include <libxml/xpath.h>
-#include <memory>
 
 #include "tests/testing/test_paths.h"
 
@@ -37,8 +38,7 @@ void AddError(void* errors, xmlErrorPtr error) {
 std::string SchemaErrors(const std::string& message) {
   const Document document = Parse(message);
   if (document == nullptr) return "not well formed";
-  const std::string path =
-      SourcePath("tests/client/pacs_bridge/audit/audit_message.rng");
+  const std::string path = SourcePath("tests/client/pacs_bridge/audit/audit_message.rng");
   const std::unique_ptr<xmlRelaxNGParserCtxt, Free<xmlRelaxNGFreeParserCtxt>> parser(
       xmlRelaxNGNewParserCtxt(path.c_str()));
   const std::unique_ptr<xmlRelaxNG, Free<xmlRelaxNGFree>> schema(xmlRelaxNGParse(parser.get()));
@@ -55,8 +55,8 @@ std::string ValuesOf(const std::string& message, const std::string& xpath) {
   const Document document = Parse(message);
   const std::unique_ptr<xmlXPathContext, Free<xmlXPathFreeContext>> context(
       xmlXPathNewContext(document.get()));
-  const std::unique_ptr<xmlXPathObject, Free<xmlXPathFreeObject>> found(xmlXPathEvalExpression(
-      reinterpret_cast<const xmlChar*>(xpath.c_str()), context.get()));
+  const std::unique_ptr<xmlXPathObject, Free<xmlXPathFreeObject>> found(
+      xmlXPathEvalExpression(reinterpret_cast<const xmlChar*>(xpath.c_str()), context.get()));
   std::string values;
   const xmlNodeSet* const nodes = found == nullptr ? nullptr : found->nodesetval;
   for (int i = 0; nodes != nullptr && i < nodes->nodeNr; ++i) {

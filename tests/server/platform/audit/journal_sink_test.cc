@@ -14,7 +14,6 @@
 
 #include "tests/testing/journal_socket.h"
 #include "tests/testing/status_matchers.h"
-#include "tests/testing/test_authority.h"
 
 namespace tissueform {
 namespace {
@@ -36,10 +35,7 @@ class JournalSinkTest : public ::testing::Test {
     return *std::move(sink);
   }
 
-  const std::string path_ =
-      testing::EmptyTestFolder(std::string("journal_") +
-                               ::testing::UnitTest::GetInstance()->current_test_info()->name()) /
-      "socket";
+  const std::string path_ = testing::NewSocketPath();
 };
 
 TEST_F(JournalSinkTest, AnEntryHasItsFields) {
