@@ -101,7 +101,7 @@ absl::Status AuditBuffer::Remove(int64_t number) {
   TF_RETURN_IF_ERROR(
       database_->Prepare("DELETE FROM message WHERE number <= ?").Bind(number).Run());
   bytes_ -= bytes;
-  return absl::OkStatus();
+  return bytes_ == 0 ? database_->TruncateLog().status() : absl::OkStatus();
 }
 
 double AuditBuffer::Use() const {

@@ -42,7 +42,7 @@ class AuditBuffer {
 
   // The oldest messages after this number, at most `count`.
   absl::StatusOr<std::vector<Message>> Read(int64_t after, int count);
-  // Those up to and with this number.
+  // Those up to and with this number. When none is left, none of their bytes is on the disk.
   absl::Status Remove(int64_t number);
 
   // Part of the room that is used. Does not block.

@@ -5,6 +5,8 @@
 
 #include <deque>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -103,6 +105,23 @@ TEST_F(AuditBufferTest, IsItsOwnersAlone) {
               fs::perms::none)
         << entry.path();
   }
+}
+
+TEST_F(AuditBufferTest, NothingOfWhatWasRemovedIsLeftOnTheDisk) {
+  const auto buffer = Open();
+  std::deque<std::string> messages = {"PLANTED-4711"};
+  EXPECT_THAT(buffer->Append(&messages), IsOk());
+  const auto found = [this] {
+    for (const auto& entry : fs::directory_iterator(fs::path(path_).parent_path())) {
+      std::ifstream stream(entry.path(), std::ios::binary);
+      const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+      if (bytes.find("PLANTED") != std::string::npos) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(found()) << "it would be seen";
+  EXPECT_THAT(buffer->Remove(1), IsOk());
+  EXPECT_FALSE(found());
 }
 
 TEST_F(AuditBufferTest, AFileThatIsNoDatabaseIsRefusedByName) {
