@@ -84,7 +84,7 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
 int main(int argc, char** argv) {
   tissueform::ReturnFreedMemory();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe on stdout shall not end a server
-  std::signal(SIGHUP, SIG_IGN);   // neither does log rotation or a terminal that closes
+  std::signal(SIGHUP, SIG_IGN);   // nor shall log rotation or a terminal that closes
   CLI::App app(kDescription, "tissueform-server");
   tissueform::ServerOptions options = tissueform::ServerOptions::Defaults();
   tissueform::AddServerOptions(app, &options);

@@ -243,6 +243,7 @@ def look_at_journal(programs, folder):
     check(entry["PRIORITY"] == "5" and entry["SYSLOG_FACILITY"] == "10" and entry["_PID"] == str(server.process.pid), "its fields are right", entry)
     end(journald)
     journald = start_journald()
+    server.process.send_signal(signal.SIGHUP)  # as log rotation does
     server.list_sessions(1)
     wait_for("a journald that was restarted has the next call", lambda: len(journal_entries()) == 4)
     check(end(server.process) == 0, "the server ends")
