@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "client/cli/account/audit_command.h"
 #include "client/cli/account/token_command.h"
 #include "client/cli/compare/compare_command.h"
 #include "client/cli/mesh/mesh_command.h"
@@ -42,7 +41,6 @@ int main(int argc, char** argv) {
     tissueform::AddCompanionCommand(app, tissueform::kShareCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kWhoamiCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kServerInfoCommand, words, work);
-    tissueform::AddAuditCommand(app, work);
     tissueform::AddCompanionCommand(app, tissueform::kDoctorCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kLoginCommand, words, work);
     tissueform::AddCompanionCommand(app, tissueform::kLogoutCommand, words, work);

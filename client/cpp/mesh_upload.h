@@ -11,7 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "client/cpp/backoff.h"
+#include "core/base/backoff.h"
 #include "core/mesh/payload/mesh_payload.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
 

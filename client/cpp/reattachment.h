@@ -10,7 +10,7 @@
 
 #include "absl/status/status.h"
 
-#include "client/cpp/backoff.h"
+#include "core/base/backoff.h"
 #include "core/base/mutex.h"
 
 namespace tissueform {

@@ -13,8 +13,8 @@
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/status.h"
 
-#include "client/cpp/backoff.h"
 #include "client/cpp/session_routes.h"
+#include "core/base/backoff.h"
 #include "tissueform/v1/session_service.pb.h"
 
 namespace tissueform {

@@ -205,6 +205,7 @@ void AddBridgeOptions(CLI::App& app, BridgeOptions* options) {
   AddServer(app, options);
   AddReview(app, options);
   AddRetention(app, &options->retention);
+  AddAuditOptions(app, "--state-dir", &options->audit);
   app.add_option("--log-level", options->log_level,
                  "log level on stderr; logs contain queue keys, never patient data")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))

@@ -19,6 +19,7 @@
 #include "client/pacs_bridge/work/plan_work.h"
 #include "client/pacs_bridge/work/retention.h"
 #include "core/imaging/series/series_rules.h"
+#include "server/platform/audit/audit_options.h"
 
 namespace tissueform {
 
@@ -45,6 +46,7 @@ struct BridgeOptions {
   bool has_review = true;
 
   RetentionOptions retention = {};
+  AuditOptions audit = {};
   std::string log_level = "info";
   std::string log_format = "text";
 };

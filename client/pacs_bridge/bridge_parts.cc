@@ -10,6 +10,7 @@
 #include "spdlog/spdlog.h"
 #include <sys/eventfd.h>
 
+#include "client/pacs_bridge/audit/audited_pacs_client.h"
 #include "client/pacs_bridge/work/prediction_writer.h"
 #include "core/base/status_macros.h"
 
@@ -34,11 +35,24 @@ ReceiverOptions ReceiverOptionsOf(const BridgeOptions& options) {
   return receiver;
 }
 
+absl::Status BridgeParts::StartAudit(const BridgeOptions& options, const std::string& folder) {
+  if (!options.audit.enabled()) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(
+      std::unique_ptr<AuditSink> sink,
+      OpenAuditSink(options.audit, {.name = "tissueform-pacs", .message_id = kDicomAuditMessageId},
+                    options.tls, folder));
+  TF_ASSIGN_OR_RETURN(audit_, BridgeAudit::Start(std::move(sink), options.receiver.ae_title));
+  return absl::OkStatus();
+}
+
 absl::Status BridgeParts::OpenPacs(const BridgeOptions& options) {
   if (!options.has_pacs()) return absl::OkStatus();
   const PacsPeer peer = PeerOf(options);
   TF_ASSIGN_OR_RETURN(pacs_, MakePacsClient(peer));
   TF_ASSIGN_OR_RETURN(counting_pacs_, MakePacsClient(peer));
+  if (audit_ == nullptr) return absl::OkStatus();
+  pacs_ = MakeAuditedPacsClient(audit_.get(), peer, std::move(pacs_));
+  counting_pacs_ = MakeAuditedPacsClient(audit_.get(), peer, std::move(counting_pacs_));
   return absl::OkStatus();
 }
 
@@ -49,6 +63,7 @@ absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptio
   TF_ASSIGN_OR_RETURN(parts->folder_,
                       InstanceFolder::Open({.path = parts->queue_->received_folder(),
                                             .watermark_bytes = options.watermark_bytes}));
+  TF_RETURN_IF_ERROR(parts->StartAudit(options, folder));
   if (!options.server.empty()) {
     TF_ASSIGN_OR_RETURN(parts->server_, ConnectToCaseServer(options.server, options.connection));
   }
@@ -64,7 +79,11 @@ absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptio
     };
   }
   parts->intake_ = std::make_unique<SeriesIntake>(parts->queue_.get(), std::move(intake));
-  parts->sink_ = std::make_unique<IntakeSink>(parts->intake_.get());
+  parts->intake_sink_ = std::make_unique<IntakeSink>(parts->intake_.get());
+  if (parts->audit_ != nullptr) {
+    parts->audited_sink_ =
+        std::make_unique<AuditedSink>(parts->audit_.get(), parts->intake_sink_.get());
+  }
   parts->cancel_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   parts->writer_ = MakePredictionWriter(options.receiver.ae_title, parts->cancel_);
   parts->export_options_ = {.header_lifetime = options.retention.keep_headers,

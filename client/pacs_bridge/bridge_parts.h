@@ -9,6 +9,8 @@
 
 #include "absl/status/statusor.h"
 
+#include "client/pacs_bridge/audit/audited_sink.h"
+#include "client/pacs_bridge/audit/bridge_audit.h"
 #include "client/pacs_bridge/bridge_options.h"
 #include "client/pacs_bridge/network/instance_folder.h"
 #include "client/pacs_bridge/work/export_work.h"
@@ -23,13 +25,16 @@ class BridgeParts {
   // Opens the queue, and what was received and a crash has kept from it. Asks nobody yet.
   //
   // Errors: those of BridgeQueue::Open, InstanceFolder::Open, RulesOf (a file of rules; none is
-  // needed for receiving), ConnectToCaseServer and MakePacsClient.
+  // needed for receiving), ConnectToCaseServer, MakePacsClient and OpenAuditSink.
   static absl::StatusOr<std::unique_ptr<BridgeParts>> Open(const BridgeOptions& options);
 
   BridgeQueue& queue() { return *queue_; }
   SeriesIntake& intake() { return *intake_; }
   InstanceFolder& folder() { return *folder_; }
-  IntakeSink& sink() { return *sink_; }
+  InstanceSink& sink() {
+    if (audited_sink_ != nullptr) return *audited_sink_;
+    return *intake_sink_;
+  }
   // Null: --server, or the PACS, is not given.
   CaseServer* server() { return server_.get(); }
   PacsClient* pacs() { return pacs_.get(); }
@@ -47,8 +52,10 @@ class BridgeParts {
 
  private:
   BridgeParts() = default;
+  absl::Status StartAudit(const BridgeOptions& options, const std::string& folder);
   absl::Status OpenPacs(const BridgeOptions& options);
 
+  std::unique_ptr<BridgeAudit> audit_;  // null: none; the others use it
   std::unique_ptr<BridgeQueue> queue_;
   std::unique_ptr<InstanceFolder> folder_;
   std::unique_ptr<CaseServer> server_;
@@ -56,7 +63,8 @@ class BridgeParts {
   std::unique_ptr<PacsClient> counting_pacs_;  // of the intake's thread
   std::unique_ptr<ObjectWriter> writer_;
   std::unique_ptr<SeriesIntake> intake_;
-  std::unique_ptr<IntakeSink> sink_;
+  std::unique_ptr<IntakeSink> intake_sink_;
+  std::unique_ptr<AuditedSink> audited_sink_;  // null: no audit
   ExportWorkOptions export_options_ = {};
   int cancel_ = -1;
 };

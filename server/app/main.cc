@@ -36,9 +36,9 @@ constexpr char kDescription[] =
 enum ExitCode : int { kExitDone = 0, kExitFailed = 1 };
 
 constexpr uint64_t kTerminationSignals =
-    (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1)) | (uint64_t{1} << (SIGHUP - 1));
+    (uint64_t{1} << (SIGTERM - 1)) | (uint64_t{1} << (SIGINT - 1));
 
-// Blocks SIGTERM, SIGINT and SIGHUP for every thread that there will be. In main() it would be too
+// Blocks SIGTERM and SIGINT for every thread that there will be. In main() it would be too
 // late: OpenBLAS starts threads when it is loaded, and a second signal, while the server drains,
 // would end the process by one of them. Handlers would not do either: METIS takes SIGTERM for a
 // jump of its own while it orders a matrix, and leaves a handler behind that lasts for one signal.
@@ -52,15 +52,13 @@ __attribute__((no_sanitize("address", "thread", "undefined"))) void BlockTermina
 __attribute__((section(".preinit_array"),
                used)) void (*const run_first)() = BlockTerminationSignals;
 
-// SIGHUP is how log rotation says that files were moved.
-void WaitForTerminationSignal(tissueform::TissueformServer* server) {
+void WaitForTerminationSignal() {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGHUP);
   int number = 0;
-  while (sigwait(&signals, &number) == 0 && number == SIGHUP) server->CheckFiles();
+  sigwait(&signals, &number);
 }
 
 ExitCode Serve(const tissueform::ServerOptions& options) {
@@ -74,7 +72,7 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
   const tissueform::SystemdWatchdog watchdog(
       [&server](std::function<void()> answered) { (*server)->Ask(std::move(answered)); });
   tissueform::TellSystemdReady();
-  WaitForTerminationSignal(server->get());
+  WaitForTerminationSignal();
   tissueform::TellSystemdStopping();
   (*server)->Drain();
   spdlog::info("done");
@@ -86,6 +84,7 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
 int main(int argc, char** argv) {
   tissueform::ReturnFreedMemory();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe on stdout shall not end a server
+  std::signal(SIGHUP, SIG_IGN);   // nor shall log rotation or a terminal that closes
   CLI::App app(kDescription, "tissueform-server");
   tissueform::ServerOptions options = tissueform::ServerOptions::Defaults();
   tissueform::AddServerOptions(app, &options);

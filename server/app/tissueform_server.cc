@@ -83,6 +83,15 @@ ConnectionListener::Options ListenerOptions(const ServerOptions& options) {
           .most_of_address = options.max_connections_per_address};
 }
 
+absl::StatusOr<std::unique_ptr<Telemetry>> StartTelemetry(const ServerOptions& options) {
+  std::string folder;
+  if (!options.in_memory && !options.cluster.enabled()) {
+    TF_ASSIGN_OR_RETURN(folder, DataFolderOf(options));
+  }
+  return Telemetry::Start(options.telemetry,
+                          {.certificate = options.tls.certificate, .key = options.tls.key}, folder);
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
@@ -90,13 +99,14 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   const bool has_logins = authenticator != nullptr || options.tokens.configured();
   TF_RETURN_IF_ERROR(CheckExposure(options.host, options.tls, has_logins));
   Parts parts;
-  TF_ASSIGN_OR_RETURN(parts.telemetry, Telemetry::Start(options.telemetry));
   TF_ASSIGN_OR_RETURN(parts.tls_files, LoadServerFiles(options.tls));
   if (options.tokens.configured()) {
     TF_ASSIGN_OR_RETURN(parts.tokens, TokenAuthenticator::Start(options.tokens));
   }
   parts.authenticator = authenticator != nullptr ? authenticator : parts.tokens.get();
   TF_ASSIGN_OR_RETURN(parts.opened, OpenStores(options));
+  // After the stores, which lock the data folder.
+  TF_ASSIGN_OR_RETURN(parts.telemetry, StartTelemetry(options));
   if (parts.opened.shared != nullptr) {
     TF_ASSIGN_OR_RETURN(parts.cluster,
                         Cluster::Open(options.cluster, options.port, parts.opened.shared));

@@ -83,8 +83,6 @@ class TissueformServer {
 
   // Calls `answered` later, when the lanes that planners wait for have each done a job.
   void Ask(std::function<void()> answered);
-  // Files that it writes may have been moved away. Any thread.
-  void CheckFiles() { telemetry_->CheckFiles(); }
 
   const MemoryBudget& memory_budget() const { return budget_; }
   Stores& stores() { return *stores_; }

@@ -168,6 +168,15 @@ void AddConfiguration(CLI::App& app, const std::string& environment_prefix) {
   app.add_flag("--print-config", help)->configurable(false);
 }
 
+void AddRemovedOption(CLI::App& app, const std::string& name, const std::string& instead) {
+  app.add_option_function<std::string>(name,
+                                       [name, instead](const std::string& /*value*/) {
+                                         throw CLI::ValidationError(name, "removed; " + instead);
+                                       })
+      ->expected(0, 1)
+      ->group("");
+}
+
 std::optional<int> ParseProgramOptions(CLI::App& app, int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
@@ -192,7 +201,7 @@ std::optional<int> ParseProgramOptions(CLI::App& app, int argc, const char* cons
 std::string PrintedConfiguration(const CLI::App& app) {
   std::string text;
   for (const CLI::Option* option : app.get_options()) {
-    if (option->get_configurable()) text += Line(*option);
+    if (option->get_configurable() && !option->get_group().empty()) text += Line(*option);
   }
   return text;
 }

@@ -19,6 +19,10 @@ namespace tissueform {
 // A variable that is empty says nothing; several values of one option are written [A,B].
 void AddConfiguration(CLI::App& app, const std::string& environment_prefix);
 
+// Makes an option of an earlier release an error that says what to do instead, wherever it is
+// given. Call it before AddConfiguration.
+void AddRemovedOption(CLI::App& app, const std::string& name, const std::string& instead);
+
 // Parses the command line and what AddConfiguration has added. An exit code when the program is to
 // end: 0 when --help or --print-config was answered on stdout, 2 when an option is wrong, which is
 // told on stderr in one line.

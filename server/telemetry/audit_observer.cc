@@ -14,7 +14,7 @@
 namespace tissueform {
 namespace {
 
-// Names are shorter; with all escapes a line stays below kMaxAuditLineBytes.
+// With all escapes an event stays below 8192 bytes, which collectors take as a rule (RFC 5425).
 constexpr size_t kMaxOfAName = 256;
 
 using Json = nlohmann::ordered_json;
@@ -49,14 +49,17 @@ void AddOutcome(const absl::Status& outcome, std::chrono::steady_clock::duration
   (*line)["duration_ms"] = std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count();
 }
 
-// The inside of the object.
-std::string Inside(const Json& line) {
-  const std::string text =
-      line.dump(-1, ' ', /*ensure_ascii=*/true, Json::error_handler_t::replace);
-  return text.substr(1, text.size() - 2);
+std::string TextOf(const Json& line) {
+  return line.dump(-1, ' ', /*ensure_ascii=*/true, Json::error_handler_t::replace);
 }
 
 }  // namespace
+
+std::string AuditObserver::LostEvent(int64_t count) {
+  Json line = Event("lost", absl::Now());
+  line["count"] = count;
+  return TextOf(line);
+}
 
 AuditObserver::AuditObserver(AuditLog* log, std::function<absl::Time()> now)
     : log_(log),
@@ -74,14 +77,14 @@ absl::Status AuditObserver::OnBegin(const ObservedCall& call) {
   if (IsLeftOut(call.method)) return absl::OkStatus();
   const bool streams = IsStream(call.method);
   absl::Status reserved = log_->Reserve(streams ? 2 : 1);
-  if (reserved.ok() && streams) log_->Write(Inside(CallEvent("open", now_(), call)));
+  if (reserved.ok() && streams) log_->Write(TextOf(CallEvent("open", now_(), call)));
   return reserved;
 }
 
 void AuditObserver::OnResource(const ObservedCall& call) {
   // Of other calls the end, which comes at once, has it.
   if (!call.served || !IsStream(call.method) || IsLeftOut(call.method)) return;
-  log_->WriteIfRoom(Inside(CallEvent("use", now_(), call)));
+  log_->WriteIfRoom(TextOf(CallEvent("use", now_(), call)));
 }
 
 void AuditObserver::OnEnd(const ObservedCall& call, const absl::Status& outcome,
@@ -92,9 +95,9 @@ void AuditObserver::OnEnd(const ObservedCall& call, const absl::Status& outcome,
   Json line = CallEvent(event, now_(), call);
   AddOutcome(outcome, elapsed, &line);
   if (call.served) {
-    log_->Write(Inside(line));
+    log_->Write(TextOf(line));
   } else {
-    log_->WriteIfRoom(Inside(line));
+    log_->WriteIfRoom(TextOf(line));
   }
 }
 
@@ -118,7 +121,7 @@ void AuditObserver::TellUntoldRefused(absl::Time now) {
   if (untold_ == 0) return;
   Json line = Event("refused_more", now);
   line["count"] = std::exchange(untold_, 0);
-  log_->WriteIfRoom(Inside(line));
+  log_->WriteIfRoom(TextOf(line));
 }
 
 }  // namespace tissueform

@@ -14,14 +14,14 @@
 #include "absl/time/time.h"
 
 #include "core/base/mutex.h"
+#include "server/platform/audit/audit_log.h"
 #include "server/rpc/calls/call_observer.h"
-#include "server/telemetry/audit_log.h"
 
 namespace tissueform {
 
-// Writes who has called what into an audit log: a line of every call when it ends, of a stream also
-// when it opens and when it names what it is about. Nothing that a call brings or is answered goes
-// there.
+// Writes who has called what into an audit log, as one JSON object per event: every call when it
+// ends, a stream also when it opens and when it names its resource. Nothing that a call brings or
+// is answered goes there.
 //
 // Left out are calls that touch no content: what the server is (GetServerInfo), who one is
 // (WhoAmI), and the acknowledgements of a watch. All others are refused while the log cannot be
@@ -34,6 +34,9 @@ namespace tissueform {
 class AuditObserver final : public CallObserver {
  public:
   static constexpr int kRefusedLinesASecond = 20;
+
+  // For AuditLog::Options: so many events found no room.
+  static std::string LostEvent(int64_t count);
 
   // `log` must outlive it.
   explicit AuditObserver(

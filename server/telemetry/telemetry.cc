@@ -3,36 +3,29 @@
 
 #include "server/telemetry/telemetry.h"
 
-#include <string>
-#include <syslog.h>
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/platform/audit_chain/audit_key.h"
+#include "server/platform/audit/audit_options.h"
 
 namespace tissueform {
 namespace {
 
-void TellSystemLog(const std::string& text) {
-  syslog(LOG_AUTHPRIV | LOG_NOTICE, "%s", text.c_str());
-}
+const AuditProgram kProgram = {.name = "tissueform-server", .message_id = "tissueform-call"};
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Telemetry>> Telemetry::Start(const TelemetryOptions& options) {
+absl::StatusOr<std::unique_ptr<Telemetry>> Telemetry::Start(const TelemetryOptions& options,
+                                                            const TlsFiles& identity,
+                                                            const std::string& data_folder) {
   std::unique_ptr<Telemetry> telemetry(new Telemetry);
-  if (!options.audit_log.empty()) TF_RETURN_IF_ERROR(telemetry->StartAudit(options));
+  if (!options.audit.enabled()) return telemetry;
+  TF_ASSIGN_OR_RETURN(std::unique_ptr<AuditSink> sink,
+                      OpenAuditSink(options.audit, kProgram, identity, data_folder));
+  telemetry->audit_log_ = std::make_unique<AuditLog>(
+      std::move(sink), AuditLog::Options{.lost_message = &AuditObserver::LostEvent});
+  telemetry->audit_observer_.emplace(telemetry->audit_log_.get());
   return telemetry;
-}
-
-absl::Status Telemetry::StartAudit(const TelemetryOptions& options) {
-  TF_ASSIGN_OR_RETURN(AuditKey key, AuditKey::Read(options.audit_key));
-  AuditLog::Options log_options;
-  log_options.file = {.path = options.audit_log};
-  if (options.audit_syslog) log_options.checkpoint = TellSystemLog;
-  TF_ASSIGN_OR_RETURN(audit_log_, AuditLog::Open(std::move(key), std::move(log_options)));
-  audit_observer_.emplace(audit_log_.get());
-  return absl::OkStatus();
 }
 
 absl::Status Telemetry::OnBegin(const ObservedCall& call) {
@@ -50,23 +43,22 @@ void Telemetry::OnEnd(const ObservedCall& call, const absl::Status& outcome,
   if (audit_observer_.has_value()) audit_observer_->OnEnd(call, outcome, elapsed);
 }
 
-void Telemetry::CheckFiles() {
-  if (audit_log_ != nullptr) audit_log_->CheckFile();
-}
-
 void Telemetry::AddTo(MetricsPage* page) const {
   call_metrics_.AddTo(page);
   if (audit_log_ == nullptr) return;
   const AuditLog* log = audit_log_.get();
-  page->AddCounter("tissueform_audit_lines_total", "Lines written to the audit log.", {},
-                   [log] { return static_cast<double>(log->Read().written); });
-  page->AddCounter("tissueform_audit_lost_total", "Lines for which the audit log had no room.", {},
+  page->AddCounter("tissueform_audit_events_total", "Events that the journal or the buffer took.",
+                   {}, [log] { return static_cast<double>(log->Read().written); });
+  page->AddCounter("tissueform_audit_lost_total", "Events for which the audit log had no room.", {},
                    [log] { return static_cast<double>(log->Read().lost); });
-  page->AddGauge("tissueform_audit_waiting", "Lines that wait to be written.", {},
+  page->AddGauge("tissueform_audit_waiting", "Events that wait to be written.", {},
                  [log] { return static_cast<double>(log->Read().waiting); });
   page->AddGauge("tissueform_audit_failing",
                  "1 while the audit log cannot be written, and work is refused.", {},
                  [log] { return log->Read().failing ? 1.0 : 0.0; });
+  page->AddGauge("tissueform_audit_buffer_use_ratio",
+                 "Part of the buffer that holds events which the collector does not have.", {},
+                 [log] { return log->BufferUse(); });
 }
 
 }  // namespace tissueform

@@ -5,13 +5,15 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+#include "core/base/certificates.h"
+#include "server/platform/audit/audit_log.h"
 #include "server/platform/metrics_page.h"
 #include "server/rpc/calls/call_observer.h"
-#include "server/telemetry/audit_log.h"
 #include "server/telemetry/audit_observer.h"
 #include "server/telemetry/call_metrics.h"
 #include "server/telemetry/server_metrics.h"
@@ -23,8 +25,10 @@ namespace tissueform {
 // to be told of every call. Thread-safe.
 class Telemetry final : public CallObserver {
  public:
-  // Errors: those of AuditKey::Read and AuditLog::Open.
-  static absl::StatusOr<std::unique_ptr<Telemetry>> Start(const TelemetryOptions& options);
+  // `identity` and `data_folder` as in OpenAuditSink. Errors: those of OpenAuditSink.
+  static absl::StatusOr<std::unique_ptr<Telemetry>> Start(const TelemetryOptions& options,
+                                                          const TlsFiles& identity = {},
+                                                          const std::string& data_folder = {});
 
   // The audit decides: errors are its own.
   absl::Status OnBegin(const ObservedCall& call) override;
@@ -35,16 +39,11 @@ class Telemetry final : public CallObserver {
   SessionEventCounts& session_events() { return session_events_; }
   const SessionEventCounts& session_events() const { return session_events_; }
 
-  // Files may have been moved away (SIGHUP).
-  void CheckFiles();
-
   // The page must end before this.
   void AddTo(MetricsPage* page) const;
 
  private:
   Telemetry() = default;
-
-  absl::Status StartAudit(const TelemetryOptions& options);
 
   CallMetrics call_metrics_;
   SessionEventCounts session_events_;

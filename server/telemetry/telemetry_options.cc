@@ -3,6 +3,8 @@
 
 #include "server/telemetry/telemetry_options.h"
 
+#include "server/platform/program_options.h"
+
 namespace tissueform {
 
 void AddTelemetryOptions(CLI::App& app, TelemetryOptions* options) {
@@ -14,22 +16,10 @@ void AddTelemetryOptions(CLI::App& app, TelemetryOptions* options) {
                  "log format: text, or one JSON object per line")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  CLI::Option* audit_log =
-      app.add_option("--audit-log", options->audit_log,
-                     "audit log: who called what, one JSON object per line; when "
-                     "it cannot be written, calls are refused")
-          ->type_name("FILE");
-  CLI::Option* audit_key =
-      app.add_option("--audit-key", options->audit_key,
-                     "file with the key of the audit log's chain, mode 0600 (`tissueform audit "
-                     "keygen` makes one)")
-          ->type_name("FILE");
-  audit_log->needs(audit_key);
-  audit_key->needs(audit_log);
-  app.add_flag("--audit-syslog", options->audit_syslog,
-               "write checkpoints of the audit log to the system log, so that "
-               "truncation is detected")
-      ->needs(audit_log);
+  AddAuditOptions(app, "the data folder", &options->audit);
+  for (const char* const name : {"--audit-log", "--audit-key", "--audit-syslog"}) {
+    AddRemovedOption(app, name, "give --audit journal or --audit syslog://HOST:PORT");
+  }
 }
 
 }  // namespace tissueform

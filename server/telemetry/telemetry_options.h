@@ -7,15 +7,15 @@
 
 #include "CLI/CLI.hpp"
 
+#include "server/platform/audit/audit_options.h"
+
 namespace tissueform {
 
 // What a server tells who operates it, and where.
 struct TelemetryOptions {
   int metrics_port = -1;  // of loopback; 0: any free one; -1: no metrics
   std::string log_format = "text";
-  std::string audit_log = {};  // empty: there is none
-  std::string audit_key = {};
-  bool audit_syslog = false;
+  AuditOptions audit = {};
 };
 
 // Adds --metrics-port, --log-format and those of the audit; see AddServerOptions.

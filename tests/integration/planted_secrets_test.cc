@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 
@@ -16,12 +15,10 @@
 #include "spdlog/sinks/ostream_sink.h"
 #include "spdlog/spdlog.h"
 
-#include "server/platform/audit_chain/audit_key.h"
-#include "server/platform/audit_chain/audit_verification.h"
 #include "server/platform/log_lines.h"
 #include "tests/integration/service_test.h"
 #include "tests/testing/http_get.h"
-#include "tests/testing/status_matchers.h"
+#include "tests/testing/journal_socket.h"
 #include "tissueform/v1/case_service.grpc.pb.h"
 #include "tissueform/v1/mesh_service.grpc.pb.h"
 #include "tissueform/v1/prediction_service.grpc.pb.h"
@@ -45,7 +42,7 @@ class PlantedSecretsTest : public ServiceTest {
   void SetUp() override {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    ASSERT_THAT(AuditKey::WriteNew(key_), IsOk());
+    journal_.emplace(socket_);
     before_ = spdlog::default_logger();
     auto logger = std::make_shared<spdlog::logger>(
         "server", std::make_shared<spdlog::sinks::ostream_sink_mt>(log_));
@@ -56,8 +53,7 @@ class PlantedSecretsTest : public ServiceTest {
     options.in_memory = false;
     options.data_dir = folder_ / "kept";
     options.telemetry.metrics_port = 0;
-    options.telemetry.audit_log = audit_;
-    options.telemetry.audit_key = key_;
+    options.telemetry.audit = {.target = "journal", .journal_socket = socket_};
     StartServer(options);
   }
   void TearDown() override { spdlog::set_default_logger(before_); }
@@ -96,17 +92,19 @@ class PlantedSecretsTest : public ServiceTest {
     writer->Finish();
   }
 
-  std::string Audit() const {
-    std::ifstream stream(audit_);
-    return {std::istreambuf_iterator<char>(stream), {}};
+  // All events so far.
+  const std::string& Audit() {
+    for (const std::string& message : journal_->Messages()) audit_ += message + "\n";
+    return audit_;
   }
 
   const fs::path folder_ =
       fs::path(::testing::TempDir()) /
       absl::StrCat("planted_secrets_",
                    ::testing::UnitTest::GetInstance()->current_test_info()->name());
-  const std::string audit_ = (folder_ / "audit.jsonl").string();
-  const std::string key_ = (folder_ / "key").string();
+  const std::string socket_ = NewSocketPath();
+  std::optional<JournalSocket> journal_;
+  std::string audit_;
   std::ostringstream log_;
   std::shared_ptr<spdlog::logger> before_;
 };
@@ -128,7 +126,7 @@ TEST_F(PlantedSecretsTest, AreNeitherInLogNorMetricsNorAudit) {
   SendCase();
   // As much as there will be: the stream of the case is the last.
   ASSERT_TRUE(Eventually([this] {
-    const std::string audit = Audit();
+    const std::string& audit = Audit();
     return audit.find("CaseService.UploadCase", audit.find("\"close\"")) != std::string::npos;
   }));
   EXPECT_THAT(Audit(), Not(HasSubstr("PLANTED")));
@@ -139,25 +137,10 @@ TEST_F(PlantedSecretsTest, AreNeitherInLogNorMetricsNorAudit) {
   EXPECT_THAT(Audit(), HasSubstr("\"rpc\":\"PredictionService.CreatePrediction\""));
   EXPECT_THAT(log_.str(), HasSubstr(absl::StrCat("\"traceparent\":\"", kTraceparent, "\"")));
   EXPECT_THAT(log_.str(), HasSubstr(absl::StrCat("\"request_id\":\"", kRequestId, "\"")));
-  ASSERT_OK_AND_ASSIGN(const AuditKey key, AuditKey::Read(key_));
-  ASSERT_OK_AND_ASSIGN(const AuditReport report, VerifyAuditFiles({audit_}, key));
-  EXPECT_FALSE(report.finding.has_value());
   std::istringstream lines(log_.str());
   for (std::string line; std::getline(lines, line);) {
     EXPECT_TRUE(nlohmann::json::accept(line)) << line;
   }
-}
-
-TEST_F(PlantedSecretsTest, WithoutAReadableKeyTheServerDoesNotStart) {
-  ServerOptions options = TestOptions();
-  options.telemetry.audit_log = (folder_ / "other.jsonl").string();
-  options.telemetry.audit_key = (folder_ / "none").string();
-  EXPECT_THAT(TissueformServer::Start(options),
-              StatusIs(absl::StatusCode::kNotFound, HasSubstr("keygen")));
-  fs::permissions(key_, fs::perms::group_read, fs::perm_options::add);
-  options.telemetry.audit_key = key_;
-  EXPECT_THAT(TissueformServer::Start(options),
-              StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("chmod 600")));
 }
 
 }  // namespace

@@ -97,7 +97,7 @@ BROKEN = {
     "a variable that HAProxy does not read": (lambda o: of_name(o, "Deployment", "tissueform-haproxy")["spec"]["template"]["spec"]["containers"][0]["env"].append(
         {"name": "TISSUEFORM_SERVERS", "value": "x"}), "cluster.cfg does not read TISSUEFORM_SERVERS"),
     "a node without an address": (lambda o: o.remove(of_name(o, "Service", "tissueform-server-1")), "tissueform-server-1: it has no Service"),
-    "a file that no volume brings": (lambda o: first(o)["args"].append("--audit-key=/etc/tissueform/audit/key"), "no volume brings /etc/tissueform/audit/key"),
+    "a file that no volume brings": (lambda o: first(o)["args"].append("--audit-ca=/etc/tissueform/audit/ca.pem"), "no volume brings /etc/tissueform/audit/ca.pem"),
     "a key that nobody makes": (lambda o: manifests.pod(server_of(o))["volumes"][1]["secret"]["items"][0].update(key="pasword"), "no row for pasword"),
     "too little memory": (lambda o: first(o)["resources"].update(requests={"cpu": "2", "memory": "6Gi"}, limits={"memory": "6Gi"}), "does not bear its budget"),
     "more workers than cores": (lambda o: change(first(o)["args"], "--workers=2", "--workers=4"), "4 workers on 2 cores"),

@@ -9,7 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 
-#include "client/cpp/backoff.h"
+#include "core/base/backoff.h"
 
 namespace tissueform {
 namespace {

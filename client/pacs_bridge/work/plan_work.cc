@@ -14,9 +14,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 
-#include "client/cpp/backoff.h"
 #include "client/pacs_bridge/work/tissueform_command.h"
 #include "core/base/atomic_folder.h"
+#include "core/base/backoff.h"
 #include "core/base/error_reason.h"
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"

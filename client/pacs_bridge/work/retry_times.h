@@ -9,7 +9,7 @@
 
 #include "absl/status/status.h"
 
-#include "client/cpp/backoff.h"
+#include "core/base/backoff.h"
 
 namespace tissueform {
 

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <mutex>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include <curl/curl.h>
+
+#include "core/base/status_macros.h"
+#include "server/platform/http/curl_handle.h"
 
 namespace tissueform {
 namespace {
@@ -19,9 +21,6 @@ constexpr std::array<absl::string_view, 3> kThisMachine = {"localhost", "127.0.0
 
 struct FreeUrl {
   void operator()(CURLU* url) const { curl_url_cleanup(url); }
-};
-struct FreeHandle {
-  void operator()(CURL* handle) const { curl_easy_cleanup(handle); }
 };
 struct FreeHeaders {
   void operator()(curl_slist* list) const { curl_slist_free_all(list); }
@@ -66,16 +65,10 @@ size_t TakeBody(const char* bytes, size_t /*one*/, size_t size, void* data) {
   return size;
 }
 
-int EndWhenStopping(void* stopping, curl_off_t /*of*/, curl_off_t /*down*/, curl_off_t /*to*/,
-                    curl_off_t /*up*/) {
-  return *static_cast<const std::atomic<bool>*>(stopping) ? 1 : 0;
-}
-
 void SetLimits(const HttpRequest& request, CURL* handle) {
   curl_easy_setopt(handle, CURLOPT_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(handle, CURLOPT_FOLLOWLOCATION, 0L);
   if (!request.use_proxy) curl_easy_setopt(handle, CURLOPT_PROXY, "");
-  curl_easy_setopt(handle, CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(handle, CURLOPT_CONNECTTIMEOUT, static_cast<long>(request.connect_time.count()));
   curl_easy_setopt(handle, CURLOPT_TIMEOUT, static_cast<long>(request.total_time.count()));
   if (request.silence_time.count() > 0) {
@@ -83,20 +76,6 @@ void SetLimits(const HttpRequest& request, CURL* handle) {
     curl_easy_setopt(handle, CURLOPT_LOW_SPEED_TIME,
                      static_cast<long>(request.silence_time.count()));
   }
-  if (request.stopping == nullptr) return;
-  curl_easy_setopt(handle, CURLOPT_NOPROGRESS, 0L);
-  curl_easy_setopt(handle, CURLOPT_XFERINFOFUNCTION, &EndWhenStopping);
-  curl_easy_setopt(handle, CURLOPT_XFERINFODATA, request.stopping);
-}
-
-void SetTls(const HttpRequest& request, CURL* handle) {
-  curl_easy_setopt(handle, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
-  if (!request.authorities.empty()) {
-    curl_easy_setopt(handle, CURLOPT_CAINFO, request.authorities.c_str());
-  }
-  if (request.certificate.empty()) return;
-  curl_easy_setopt(handle, CURLOPT_SSLCERT, request.certificate.c_str());
-  curl_easy_setopt(handle, CURLOPT_SSLKEY, request.key.c_str());
 }
 
 void SetContent(Transfer* transfer, curl_slist* headers) {
@@ -118,22 +97,7 @@ absl::Status ErrorOf(const Transfer& transfer, CURLcode code) {
     return absl::OutOfRangeError(
         absl::StrCat("the answer is larger than ", transfer.request->max_body_bytes, " bytes"));
   }
-  const char* const text = curl_easy_strerror(code);
-  switch (code) {
-    case CURLE_OPERATION_TIMEDOUT:
-      return absl::DeadlineExceededError(text);
-    case CURLE_SSL_CONNECT_ERROR:
-    case CURLE_PEER_FAILED_VERIFICATION:
-    case CURLE_SSL_CERTPROBLEM:
-    case CURLE_SSL_CACERT_BADFILE:
-    case CURLE_SSL_CIPHER:
-      return absl::UnauthenticatedError(text);
-    case CURLE_WRITE_ERROR:
-    case CURLE_ABORTED_BY_CALLBACK:
-      return absl::CancelledError(text);
-    default:
-      return absl::UnavailableError(text);
-  }
+  return CurlError(code);
 }
 
 }  // namespace
@@ -165,17 +129,14 @@ std::string EncodeForm(const HttpForm& form) {
 }
 
 absl::StatusOr<HttpAnswer> SendHttp(const HttpRequest& request) {
-  static std::once_flag once;
-  std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
-  const std::unique_ptr<CURL, FreeHandle> handle(curl_easy_init());
-  if (handle == nullptr) return absl::UnavailableError("libcurl does not start");
+  TF_ASSIGN_OR_RETURN(const CurlHandle handle, MakeCurlHandle(request.stopping));
   std::unique_ptr<curl_slist, FreeHeaders> headers;
   for (const std::string& header : request.headers) {
     headers.reset(curl_slist_append(headers.release(), header.c_str()));
   }
   Transfer transfer = {.handle = handle.get(), .request = &request};
   SetLimits(request, handle.get());
-  SetTls(request, handle.get());
+  SetCurlTls(handle.get(), request.authorities, request.certificate, request.key);
   SetContent(&transfer, headers.get());
   const CURLcode code = curl_easy_perform(handle.get());
   if (code != CURLE_OK) return ErrorOf(transfer, code);

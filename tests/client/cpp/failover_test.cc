@@ -15,10 +15,10 @@
 #include "grpcpp/server_builder.h"
 #include "gtest/gtest.h"
 
-#include "client/cpp/backoff.h"
 #include "client/cpp/reattaching_stream.h"
 #include "client/cpp/reattaching_watch.h"
 #include "client/cpp/tissueform_client.h"
+#include "core/base/backoff.h"
 #include "core/base/error_reason.h"
 #include "core/mesh/payload/sha256.h"
 #include "proto/conversion/case_conversion.h"
