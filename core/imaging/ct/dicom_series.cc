@@ -259,16 +259,15 @@ std::string ForbiddenChoice(const Candidate& chosen, const std::vector<Candidate
 }
 
 // Of several candidates the one that the bridge would choose in their study.
-absl::StatusOr<Candidate> ChooseByRule(const std::vector<Candidate>& candidates,
-                                       const SeriesChoice& choice,
+absl::StatusOr<Candidate> ChooseByRule(const std::vector<Candidate>& candidates, bool has_offset,
                                        std::vector<std::string>* notes) {
-  const bool may_judge =
-      !choice.series_number && std::all_of(candidates.begin(), candidates.end(), IsMeasurable);
-  if (!may_judge) return SeveralWanted(candidates, "");
+  if (!std::all_of(candidates.begin(), candidates.end(), IsMeasurable)) {
+    return SeveralWanted(candidates, "");
+  }
   std::vector<SeriesFacts> facts;
   for (const Candidate& candidate : candidates) facts.push_back(FactsOf(candidate));
   SeriesRule rule;
-  rule.hounsfield = !choice.has_offset;
+  rule.hounsfield = !has_offset;
   const std::vector<SeriesVerdict> verdicts = PickSeries(facts, {rule});
   const auto chosen = static_cast<size_t>(
       std::find_if(verdicts.begin(), verdicts.end(),
@@ -386,7 +385,7 @@ absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
   if (wanted.empty()) return NoneIsAVolume(GroupsOf(candidates), choice.join);
   Candidate chosen = wanted.front();
   if (wanted.size() > 1) {
-    TF_ASSIGN_OR_RETURN(chosen, ChooseByRule(wanted, choice, &stack.notes));
+    TF_ASSIGN_OR_RETURN(chosen, ChooseByRule(wanted, choice.has_offset, &stack.notes));
   }
   for (const Candidate& candidate : candidates) {
     const DicomHeader& first = candidate.group.slices.front();

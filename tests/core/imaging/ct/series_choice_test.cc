@@ -49,11 +49,11 @@ Series Head(int number, const std::string& kernel, int slices = 80) {
   return series;
 }
 
-// Above all others.
-void MoveUp(Series* series) {
+// As a part of the patient that no other series shows.
+void MoveTo(double z_mm, Series* series) {
   for (size_t i = 0; i < series->size(); ++i) {
     (*series)[i].Text(DicomFile::kPosition, "DS",
-                      absl::StrCat("-30\\20\\", 250 + 1.5 * static_cast<double>(i)));
+                      absl::StrCat("-30\\20\\", z_mm + 1.5 * static_cast<double>(i)));
   }
 }
 
@@ -149,15 +149,15 @@ TEST_F(SeriesChoiceTest, RuleChoosesWithinOneStudyOfOnePatientOnly) {
        "series that name no study"},
       {[](Series* soft, Series*) { Set(DicomFile::kSeriesNumber, "IS", "3", soft); },
        "scans with one series number"},
-      {[](Series* soft, Series*) { MoveUp(soft); },
-       "parts that may be one scan"}};
+      {[](Series* soft, Series*) { MoveTo(250, soft); }, "parts that may be one scan"}};
   for (const Case& one : cases) {
-    EXPECT_THAT(ReadBoth(one.change),
-                StatusIs(kInvalid, AllOf(HasSubstr("2 CT series"),
-                                         HasSubstr(absl::StrCat("does not choose between ",
-                                                                one.between, ": series ")),
-                                         HasSubstr("usable, 80 axial slices"),
-                                         HasSubstr("naming one of its files"))));
+    EXPECT_THAT(
+        ReadBoth(one.change),
+        StatusIs(
+            kInvalid,
+            AllOf(HasSubstr("2 CT series"),
+                  HasSubstr(absl::StrCat("does not choose between ", one.between, ": series ")),
+                  HasSubstr("usable, 80 axial slices"), HasSubstr("naming one of its files"))));
   }
 }
 
@@ -187,7 +187,7 @@ TEST_F(SeriesChoiceTest, OffsetOfTheRecipeStandsForTheCalibration) {
 // Where a slice without a place lies is not known: joining is not advised.
 TEST_F(SeriesChoiceTest, SeriesWithAPlacelessSliceIsNotCalledAPart) {
   EXPECT_THAT(ReadBoth([](Series* soft, Series* bone) {
-                MoveUp(soft);
+                MoveTo(-200, soft);
                 (*soft)[40].Erase(DicomFile::kPosition);
                 bone->resize(30);
               }),
