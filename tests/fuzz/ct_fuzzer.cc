@@ -50,7 +50,7 @@ double FiniteNumber(ByteSource* source) {  // as ReadDicomHeader lets through
 void TakeOrigin(ByteSource* source, DicomHeader* header) {
   const auto name = [source] { return std::string(1, source->Take<char>()); };
   header->series_uid += name();
-  header->frame_of_reference = name();
+  header->frame_uid = name();
   header->reconstruction = name();
   header->patient = std::string(source->Take<uint8_t>() % 2, 'p');
   header->acquisition_time_s = MaybeNumber(source);
@@ -71,16 +71,17 @@ DicomHeader TakeHeader(int number, ByteSource* source) {
   if ((odd & 1) != 0) header.kind = static_cast<DicomKind>(source->Take<uint8_t>() % 10);
   header.modality = "CT";
   header.series_uid = (odd & 2) != 0 ? "1.3" : "1.2";
-  header.series_number = 1;
+  header.class_uid = std::string(kCtImageClass);
+  header.study_uid = "1.4";
+  header.series_number = (odd & 2) != 0 ? 2 : 1;
   header.instance_number = source->Take<int8_t>();
   header.rows = (odd & 4) != 0 ? source->Take<uint16_t>() : 4;
   header.columns = 4;
   header.position_mm = Eigen::Vector3d(0, 0, source->Take<int8_t>());
-  header.row_direction = Eigen::Vector3d::UnitX();
-  header.column_direction = Eigen::Vector3d::UnitY();
+  header.axes = Eigen::Matrix<double, 3, 2>::Identity();
   header.pixel_spacing_mm = Eigen::Vector2d(0.5, 0.5);
   if ((odd & 8) != 0) header.position_mm->x() = FiniteNumber(source);
-  if ((odd & 16) != 0) header.row_direction->y() = FiniteNumber(source);
+  if ((odd & 16) != 0) header.axes->col(0).y() = FiniteNumber(source);
   if ((odd & 32) != 0) header.pixel_spacing_mm->x() = FiniteNumber(source);
   if ((odd & 64) != 0) header.position_mm.reset();
   if ((odd & 128) != 0) {

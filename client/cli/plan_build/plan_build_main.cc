@@ -42,6 +42,9 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
     absl::StrAppendFormat(&made.text, "  handle  %s (%s): %.1f cm3 of bone\n", segment.cut.name,
                           OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
   }
+  for (const std::string& note : build.ct.notes) {
+    absl::StrAppend(&made.text, "CT      ", note, "\n");
+  }
   absl::StrAppendFormat(&made.text, "report  %s/report.html: %s\n", request.folder_name,
                         made.ready
                             ? "all quality requirements are met"

@@ -42,9 +42,10 @@ std::optional<Eigen::Vector<double, kCount>> NumbersOf(DcmItem* dataset, const D
   return numbers;
 }
 
-int CountOf(DcmItem* dataset, const DcmTagKey& tag, int otherwise) {
+std::optional<int> CountOf(DcmItem* dataset, const DcmTagKey& tag) {
   const std::optional<double> number = NumberOf(dataset, tag);
-  return number && std::abs(*number) < 1e9 ? static_cast<int>(*number) : otherwise;
+  if (!number || std::abs(*number) >= 1e9) return {};
+  return static_cast<int>(*number);
 }
 
 struct TextField {
@@ -82,13 +83,12 @@ void ReadTexts(DcmItem* dataset, InstanceHeader* header) {
 }
 
 void ReadGeometry(DcmItem* dataset, InstanceHeader* header) {
-  header->series_number = CountOf(dataset, DCM_SeriesNumber, 0);
-  header->acquisition_number = CountOf(dataset, DCM_AcquisitionNumber, 0);
-  header->instance_number = CountOf(dataset, DCM_InstanceNumber, 0);
-  header->rows = CountOf(dataset, DCM_Rows, 0);
-  header->columns = CountOf(dataset, DCM_Columns, 0);
-  header->frames = CountOf(dataset, DCM_NumberOfFrames, 1);
-  header->position = NumbersOf<3>(dataset, DCM_ImagePositionPatient);
+  header->series_number = CountOf(dataset, DCM_SeriesNumber);
+  header->acquisition_number = CountOf(dataset, DCM_AcquisitionNumber);
+  header->instance_number = CountOf(dataset, DCM_InstanceNumber);
+  header->rows = CountOf(dataset, DCM_Rows).value_or(0);
+  header->columns = CountOf(dataset, DCM_Columns).value_or(0);
+  header->position_mm = NumbersOf<3>(dataset, DCM_ImagePositionPatient);
   if (const auto six = NumbersOf<6>(dataset, DCM_ImageOrientationPatient)) {
     header->axes.emplace();
     *header->axes << six->head<3>(), six->tail<3>();

@@ -14,7 +14,8 @@
 namespace tissueform {
 
 // What the bridge wants to know of one object: what a series is chosen by, and whose it is. Texts
-// have at most DicomTexts::kMaxBytes. The UIDs are as IsDicomUid wants them, or empty.
+// are UTF-8 and have at most DicomTexts::kMaxBytes. The UIDs are as IsDicomUid wants them, or
+// empty.
 struct InstanceHeader : ImageHeader {
   std::string instance_uid = {};
   std::string transfer_syntax_uid = {};

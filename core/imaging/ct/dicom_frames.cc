@@ -43,8 +43,7 @@ void ReadGeometry(const gdcm::DataSet& groups, DicomHeader* frame) {
   ForEachItem(groups, kPlaneOrientation, [frame](int /*index*/, const gdcm::DataSet& item) {
     const auto directions = NumbersOf(item, kOrientation, 6);
     if (!directions) return;
-    frame->row_direction = directions->head<3>();
-    frame->column_direction = directions->tail<3>();
+    frame->axes.emplace() << directions->head<3>(), directions->tail<3>();
   });
   ForEachItem(groups, kPixelMeasures, [frame](int /*index*/, const gdcm::DataSet& item) {
     if (const auto spacing = NumbersOf(item, kPixelSpacing, 2)) frame->pixel_spacing_mm = *spacing;

@@ -23,9 +23,6 @@
 namespace tissueform {
 namespace {
 
-constexpr char kCtImageStorage[] = "1.2.840.10008.5.1.4.1.1.2";
-constexpr char kEnhancedCtImageStorage[] = "1.2.840.10008.5.1.4.1.1.2.1";
-constexpr char kLegacyEnhancedCtImageStorage[] = "1.2.840.10008.5.1.4.1.1.2.2";
 constexpr char kSecondaryCaptureStorage[] = "1.2.840.10008.5.1.4.1.1.7";  // and .7.1 to .7.4
 constexpr char kPhotographicStorage[] = "1.2.840.10008.5.1.4.1.1.77.1";   // and below
 constexpr char kDirectoryStorage[] = "1.2.840.10008.1.3.10";
@@ -44,6 +41,8 @@ constexpr uint32_t kContentTime = 0x00080033;
 constexpr uint32_t kPatientName = 0x00100010;
 constexpr uint32_t kPatientId = 0x00100020;
 constexpr uint32_t kBirthDate = 0x00100030;
+constexpr uint32_t kContrastAgent = 0x00180010;
+constexpr uint32_t kSliceThickness = 0x00180050;
 constexpr uint32_t kVoltage = 0x00180060;
 constexpr uint32_t kKernel = 0x00181210;
 constexpr uint32_t kPatientPosition = 0x00185100;
@@ -64,19 +63,15 @@ constexpr uint32_t kColumns = 0x00280011;
 constexpr uint32_t kPixelSpacing = 0x00280030;
 constexpr uint32_t kRescaleIntercept = 0x00281052;
 constexpr uint32_t kRescaleSlope = 0x00281053;
+constexpr uint32_t kRescaleType = 0x00281054;
 constexpr uint32_t kLossyImageCompression = 0x00282110;
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
 
-bool IsLocaliser(const gdcm::DataSet& data) {
-  const std::string image_type = TextOf(data, kImageType);
-  return absl::StrContains(image_type, "LOCALIZER") || absl::StrContains(image_type, "SCOUT");
-}
-
 // In an order in which each test may trust the ones before: a directory has no modality, a
 // photograph may say CT, and a report of doses has no rows.
-DicomKind KindOf(const gdcm::File& file, const std::string& modality) {
+DicomKind KindOf(const gdcm::File& file, const DicomHeader& header) {
   const gdcm::DataSet& data = file.GetDataSet();
-  const std::string sop_class = TextOf(data, kSopClass);
+  const std::string& sop_class = header.class_uid;
   if (TextOf(file.GetHeader(), kMediaStorageClass) == kDirectoryStorage) {
     return DicomKind::kDirectory;
   }
@@ -84,24 +79,24 @@ DicomKind KindOf(const gdcm::File& file, const std::string& modality) {
       absl::StartsWith(sop_class, absl::StrCat(kSecondaryCaptureStorage, "."))) {
     return DicomKind::kSecondaryCapture;
   }
-  if (modality != "CT") {
-    return ShortOf(data, kRows) == 0 ? DicomKind::kNoImage : DicomKind::kOtherModality;
+  if (header.modality != "CT") {
+    return header.rows == 0 ? DicomKind::kNoImage : DicomKind::kOtherModality;
   }
-  if (IntegerOf(data, kNumberOfFrames).value_or(1) > 1 || sop_class == kEnhancedCtImageStorage ||
-      sop_class == kLegacyEnhancedCtImageStorage) {
-    return IsLocaliser(data) ? DicomKind::kLocaliser : DicomKind::kMultiFrame;
+  if (IntegerOf(data, kNumberOfFrames).value_or(1) > 1 ||
+      (IsCtClass(sop_class) && sop_class != kCtImageClass)) {
+    return IsLocaliser(header) ? DicomKind::kLocaliser : DicomKind::kMultiFrame;
   }
-  if (ShortOf(data, kRows) == 0 || ShortOf(data, kColumns) == 0) {
+  if (header.rows == 0 || header.columns == 0) {
     // A header that ends between two elements: only what is missing shows that it is cut off.
-    return sop_class == kCtImageStorage ? DicomKind::kDamaged : DicomKind::kNoImage;
+    return sop_class == kCtImageClass ? DicomKind::kDamaged : DicomKind::kNoImage;
   }
   if (ShortOf(data, kSamplesPerPixel) > 1 ||
       !absl::StartsWith(TextOf(data, kPhotometricInterpretation), "MONOCHROME")) {
     return DicomKind::kColour;
   }
-  if (IsLocaliser(data)) return DicomKind::kLocaliser;
-  return sop_class.empty() || sop_class == kCtImageStorage ? DicomKind::kCtSlice
-                                                           : DicomKind::kOtherModality;
+  if (IsLocaliser(header)) return DicomKind::kLocaliser;
+  return sop_class.empty() || sop_class == kCtImageClass ? DicomKind::kCtSlice
+                                                         : DicomKind::kOtherModality;
 }
 
 void ReadGeometry(const gdcm::DataSet& data, DicomHeader* header) {
@@ -110,21 +105,33 @@ void ReadGeometry(const gdcm::DataSet& data, DicomHeader* header) {
   if (const auto position = NumbersOf(data, kPosition, 3)) header->position_mm = *position;
   if (const auto spacing = NumbersOf(data, kPixelSpacing, 2)) header->pixel_spacing_mm = *spacing;
   if (const auto directions = NumbersOf(data, kOrientation, 6)) {
-    header->row_direction = directions->head<3>();
-    header->column_direction = directions->tail<3>();
+    header->axes.emplace() << directions->head<3>(), directions->tail<3>();
   }
+  header->slice_thickness_mm = NumberOf(data, kSliceThickness);
+}
+
+void ReadValuesAndKind(const gdcm::DataSet& data, DicomHeader* header) {
+  header->modality = TextOf(data, kModality).substr(0, 16);
+  header->class_uid = TextOf(data, kSopClass);
+  header->image_type = TextOf(data, kImageType);
+  header->convolution_kernel = TextOf(data, kKernel);
+  header->contrast = TextOf(data, kContrastAgent);
+  header->rescale_slope = NumberOf(data, kRescaleSlope);
+  header->rescale_intercept = NumberOf(data, kRescaleIntercept);
+  header->rescale_type = TextOf(data, kRescaleType);
+  header->was_lossy = TextOf(data, kLossyImageCompression) == "01";
 }
 
 // What tells patients, scans and reconstructions apart.
 void ReadOrigin(const gdcm::DataSet& data, DicomHeader* header) {
   header->series_uid = TextOf(data, kSeriesUid);
   header->study_uid = TextOf(data, kStudyUid);
-  header->frame_of_reference = TextOf(data, kFrameOfReference);
+  header->frame_uid = TextOf(data, kFrameOfReference);
   header->patient = absl::StrCat(TextOf(data, kPatientId), "\n", TextOf(data, kPatientName), "\n",
                                  TextOf(data, kBirthDate));
   header->patient_position = TextOf(data, kPatientPosition);
-  header->reconstruction = absl::StrCat(TextOf(data, kKernel), "|", TextOf(data, kVoltage), "|",
-                                        TextOf(data, kTemporalPosition));
+  header->reconstruction = absl::StrCat(header->convolution_kernel, "|", TextOf(data, kVoltage),
+                                        "|", TextOf(data, kTemporalPosition));
   header->series_number = IntegerOf(data, kSeriesNumber);
   header->instance_number = IntegerOf(data, kInstanceNumber);
   header->acquisition_number = IntegerOf(data, kAcquisitionNumber);
@@ -237,13 +244,11 @@ std::vector<DicomHeader> ReadDicomHeaders(const std::string& path) {
   if (!whole) return {header};
   const gdcm::DataSet& data = reader.GetFile().GetDataSet();
   header.pixel_offset = reader.GetStreamCurrentPosition();
-  header.modality = TextOf(data, kModality).substr(0, 16);
-  header.kind = KindOf(reader.GetFile(), header.modality);
-  header.rescale_slope = NumberOf(data, kRescaleSlope);
-  header.rescale_intercept = NumberOf(data, kRescaleIntercept);
-  header.was_lossy = TextOf(data, kLossyImageCompression) == "01";
+  ReadValuesAndKind(data, &header);
   ReadOrigin(data, &header);
   ReadGeometry(data, &header);
+  header.kind = KindOf(reader.GetFile(), header);
+  if (header.kind == DicomKind::kCtSlice) header.class_uid = std::string(kCtImageClass);
   if (header.kind != DicomKind::kMultiFrame) return {header};
   std::vector<DicomHeader> frames = FramesOf(data, header);
   return frames.empty() ? std::vector<DicomHeader>{header} : frames;

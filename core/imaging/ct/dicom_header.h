@@ -10,7 +10,8 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include <Eigen/Core>
+
+#include "core/imaging/series/image_header.h"
 
 namespace tissueform {
 
@@ -29,39 +30,24 @@ enum class DicomKind {
                // only zeros
 };
 
-// The header of one image: of a file, or of a frame of a multi-frame file.
-struct DicomHeader {
+// The header of one image: of a file, or of a frame of a multi-frame file. Texts and UIDs, except
+// the modality, are for comparison only, never in a message: they may name the patient. Their bytes
+// are the file's, whatever its character set. series_description stays empty: nothing here needs
+// it. The class of a CT slice that names none is kCtImageClass.
+struct DicomHeader : ImageHeader {
   std::string path;     // never in a message: it may name the patient
   int file_number = 0;  // place in the folder, in order of names, from 1
 
   DicomKind kind = DicomKind::kNoImage;
-  std::string modality;
   int frame = 0;  // of the file's images, from 0
   int num_frames = 1;
-  std::optional<int> series_number;
-  std::optional<int> instance_number;
 
-  // For comparison only, never in a message: they may name the patient.
   std::string patient;
-  std::string series_uid;
-  std::string study_uid;
-  std::string frame_of_reference;
-
   std::string patient_position;              // "HFS"
   std::string reconstruction;                // kernel, voltage, phase: the same in one volume
   std::optional<double> acquisition_time_s;  // all three from some day
   std::optional<double> series_time_s;
   std::optional<double> content_time_s;
-  std::optional<int> acquisition_number;
-
-  int rows = 0;
-  int columns = 0;
-  std::optional<Eigen::Vector3d> position_mm;       // of the first pixel's centre, LPS
-  std::optional<Eigen::Vector3d> row_direction;     // along which columns are counted
-  std::optional<Eigen::Vector3d> column_direction;  // along which rows are counted
-  std::optional<Eigen::Vector2d> pixel_spacing_mm;  // between rows; between columns
-  std::optional<double> rescale_slope;
-  std::optional<double> rescale_intercept;
 
   bool was_lossy = false;   // compressed with loss at some time (0028,2110)
   size_t pixel_offset = 0;  // where in the file the pixels begin

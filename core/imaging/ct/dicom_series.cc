@@ -18,6 +18,10 @@
 #include "core/base/status_macros.h"
 #include "core/imaging/ct/slice_acquisitions.h"
 #include "core/imaging/ct/slice_groups.h"
+#include "core/imaging/series/series_facts.h"
+#include "core/imaging/series/series_objections.h"
+#include "core/imaging/series/series_pick.h"
+#include "core/imaging/series/series_rules.h"
 
 namespace tissueform {
 namespace {
@@ -78,8 +82,7 @@ std::string FilesOf(const std::vector<DicomHeader>& slices) {
 }
 
 std::string HeightsOf(const std::vector<DicomHeader>& slices) {
-  const Eigen::Vector3d normal =
-      slices.front().row_direction->cross(*slices.front().column_direction);
+  const Eigen::Vector3d normal = SliceNormal(slices.front());
   double low = slices.front().position_mm->dot(normal);
   double high = low;
   for (const DicomHeader& slice : slices) {
@@ -166,7 +169,8 @@ bool MayBeJoined(const std::vector<Candidate>& candidates) {
   return true;
 }
 
-absl::Status SeveralWanted(const std::vector<Candidate>& candidates) {
+// `findings`: what the rule says of them; empty where it does not judge.
+absl::Status SeveralWanted(const std::vector<Candidate>& candidates, const std::string& findings) {
   std::set<std::optional<int>> numbers;
   std::set<std::string> patients;
   std::vector<int> first_files;
@@ -179,13 +183,107 @@ absl::Status SeveralWanted(const std::vector<Candidate>& candidates) {
   return absl::InvalidArgumentError(absl::StrCat(
       "the folder holds ", candidates.size(), " CT series",
       patients.size() > 1 ? absl::StrCat(" of ", patients.size(), " patients: ") : ": ",
-      DescribeAll(GroupsOf(candidates)), "; choose one ",
+      DescribeAll(GroupsOf(candidates)), findings, "; choose one ",
       by_number ? "with \"series_number\" in the recipe, or " : "",
       "by naming one of its files instead of the folder (file ",
       absl::StrJoin(first_files, ", file "), " in the order of names)",
       candidates.size() <= 8 && MayBeJoined(candidates)
           ? ", or read them as one with \"join_series\": \"always\""
           : ""));
+}
+
+// The rule measures single-frame CT slices only.
+bool IsMeasurable(const Candidate& candidate) {
+  const std::vector<DicomHeader>& slices = candidate.scans.front().slices;
+  return std::all_of(slices.begin(), slices.end(), [](const DicomHeader& slice) {
+    return slice.num_frames == 1 && slice.class_uid == kCtImageClass;
+  });
+}
+
+// The facts of what would be read.
+SeriesFacts FactsOf(const Candidate& candidate) {
+  const std::vector<DicomHeader>& slices = candidate.scans.front().slices;
+  return FactsOfSeries(NumberOf(candidate.group), {slices.begin(), slices.end()});
+}
+
+// Of many the first few.
+std::string JoinLines(std::vector<std::string> lines) {
+  constexpr size_t kMaxListed = 8;
+  if (lines.size() > kMaxListed) {
+    const size_t more = lines.size() - kMaxListed;
+    lines.resize(kMaxListed);
+    lines.push_back(absl::StrCat(more, " more"));
+  }
+  return absl::StrJoin(lines, "; ");
+}
+
+// "series 2: it has 24 slices, fewer than 60; series 5: usable, 231 axial slices, ...".
+std::string DescribeFindings(const std::vector<SeriesFacts>& facts, const SeriesRule& rule) {
+  std::vector<std::string> lines;
+  for (const SeriesFacts& series : facts) {
+    const std::string against = WhatIsAgainst(series, rule);
+    lines.push_back(
+        absl::StrCat(series.key, ": ",
+                     against.empty() ? absl::StrCat("usable, ", DescribeFacts(series)) : against));
+  }
+  return JoinLines(std::move(lines));
+}
+
+std::string ChoiceNote(const std::vector<SeriesFacts>& facts,
+                       const std::vector<SeriesVerdict>& verdicts, size_t chosen) {
+  std::vector<std::string> others;
+  for (size_t i = 0; i < facts.size(); ++i) {
+    if (i != chosen) others.push_back(absl::StrCat(facts[i].key, ": ", verdicts[i].reason));
+  }
+  return absl::StrCat("chosen of ", facts.size(), " CT series of one study: ", facts[chosen].key,
+                      " (", DescribeFacts(facts[chosen]), "); not ", JoinLines(std::move(others)),
+                      "; \"series_number\" in the recipe chooses another");
+}
+
+// Between what the rule would choose, as it must not; empty where it may choose this one.
+std::string ForbiddenChoice(const Candidate& chosen, const std::vector<Candidate>& candidates) {
+  const DicomHeader& first = chosen.group.slices.front();
+  if (first.study_uid.empty()) return "series that name no study";
+  int of_its_number = 0;
+  for (const Candidate& candidate : candidates) {
+    const DicomHeader& other = candidate.group.slices.front();
+    if (other.patient != first.patient) return "patients";
+    if (other.study_uid != first.study_uid) return "studies";
+    // Half a head, maybe.
+    if (CanBeOneVolume(chosen.group, candidate.group) && AreApart(chosen.group, candidate.group)) {
+      return "parts that may be one scan";
+    }
+    of_its_number += other.series_number == first.series_number ? 1 : 0;
+  }
+  return of_its_number > 1 ? "scans with one series number" : "";
+}
+
+// Of several candidates the one that the bridge would choose in their study.
+absl::StatusOr<Candidate> ChooseByRule(const std::vector<Candidate>& candidates, bool has_offset,
+                                       std::vector<std::string>* notes) {
+  if (!std::all_of(candidates.begin(), candidates.end(), IsMeasurable)) {
+    return SeveralWanted(candidates, "");
+  }
+  std::vector<SeriesFacts> facts;
+  for (const Candidate& candidate : candidates) facts.push_back(FactsOf(candidate));
+  SeriesRule rule;
+  rule.hounsfield = !has_offset;
+  const std::vector<SeriesVerdict> verdicts = PickSeries(facts, {rule});
+  const auto chosen = static_cast<size_t>(
+      std::find_if(verdicts.begin(), verdicts.end(),
+                   [](const SeriesVerdict& verdict) { return verdict.chosen; }) -
+      verdicts.begin());
+  const std::string forbidden =
+      chosen < verdicts.size() ? ForbiddenChoice(candidates[chosen], candidates) : "";
+  if (chosen == verdicts.size() || !forbidden.empty()) {
+    return SeveralWanted(
+        candidates,
+        absl::StrCat("; the default rule ",
+                     forbidden.empty() ? "accepts none" : "does not choose between " + forbidden,
+                     ": ", DescribeFindings(facts, rule)));
+  }
+  notes->push_back(ChoiceNote(facts, verdicts, chosen));
+  return candidates[chosen];
 }
 
 absl::Status NoCtSlice(const DicomHeader& file) {
@@ -285,8 +383,10 @@ absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
   std::vector<Candidate> wanted = Wanted(candidates, choice);
   if (wanted.empty() && candidates.size() == 1) wanted = candidates;
   if (wanted.empty()) return NoneIsAVolume(GroupsOf(candidates), choice.join);
-  if (wanted.size() > 1) return SeveralWanted(wanted);
-  const Candidate& chosen = wanted.front();
+  Candidate chosen = wanted.front();
+  if (wanted.size() > 1) {
+    TF_ASSIGN_OR_RETURN(chosen, ChooseByRule(wanted, choice.has_offset, &stack.notes));
+  }
   for (const Candidate& candidate : candidates) {
     const DicomHeader& first = candidate.group.slices.front();
     const DicomHeader& taken = chosen.group.slices.front();

@@ -19,6 +19,7 @@ struct SeriesChoice {
   int file_number = 0;               // 0: not chosen by a file
   std::optional<int> series_number;  // the recipe's key
   JoinSeries join = JoinSeries::kAuto;
+  bool has_offset = false;  // whether the recipe states how values become HU
 };
 
 // Finds the one CT among all DICOM files of a folder: joins series that belong together
@@ -27,9 +28,14 @@ struct SeriesChoice {
 // volume, the smaller of two scans) is noted, too, and so is what lies in the series itself and is
 // no CT slice.
 //
-// Errors: InvalidArgument when there is none, with what there is instead; when there are several,
-// with the largest of them and how to choose; when what was asked for is not there, holds no CT
-// slice, or holds what may be slices that are not read (multi-frame, cut off).
+// Of several CTs of one study the default rule of the bridge (SeriesRule) chooses, with a note. It
+// does not choose between patients, studies, scans within one series and consecutive parts of a
+// scan, nor where Enhanced CT is among them, which it does not measure.
+//
+// Errors: InvalidArgument when there is none, with what there is instead; when there are several
+// and the rule chooses none, with the largest of them, what the rule finds and how to choose; when
+// what was asked for is not there, holds no CT slice, or holds what may be slices that are not read
+// (multi-frame, cut off).
 absl::StatusOr<DicomStack> ChooseSeries(const std::vector<DicomHeader>& files,
                                         const SeriesChoice& choice);
 

@@ -20,7 +20,6 @@ namespace {
 constexpr double kSameDirection = 1e-3;
 constexpr double kSamePositionMm = 0.01;
 constexpr double kPositionToleranceMm = 0.1;  // positions are rounded when they are written
-constexpr double kMaxPositionMm = 1e5;        // beyond any scanner's table; sums stay finite
 constexpr double kLeastSpacingMm = 0.05;
 constexpr double kMaxSpacingMm = 10;
 // Longer than any protocol of the head leaves out: then it is two scans.
@@ -32,7 +31,7 @@ const char* MissingTag(const DicomHeader& slice) {
   if (!slice.position_mm || !(slice.position_mm->cwiseAbs().maxCoeff() <= kMaxPositionMm)) {
     return "position (ImagePositionPatient)";
   }
-  if (!slice.row_direction) return "orientation (ImageOrientationPatient)";
+  if (!slice.axes) return "orientation (ImageOrientationPatient)";
   if (!slice.pixel_spacing_mm) return "pixel spacing (PixelSpacing)";
   return nullptr;
 }
@@ -73,8 +72,7 @@ absl::Status CheckAlike(const std::vector<DicomHeader>& slices) {
                      absl::StrCat("size (", slice.columns, " x ", slice.rows, " instead of ",
                                   first.columns, " x ", first.rows, ")"));
     }
-    if ((*slice.row_direction - *first.row_direction).norm() > kSameDirection ||
-        (*slice.column_direction - *first.column_direction).norm() > kSameDirection) {
+    if (!HaveSameAxes(slice, first)) {
       return Differs(slice, first, "orientation");
     }
     if (!slice.pixel_spacing_mm->isApprox(*first.pixel_spacing_mm, kSameDirection)) {
@@ -89,8 +87,8 @@ absl::Status CheckAlike(const std::vector<DicomHeader>& slices) {
 }
 
 absl::Status CheckPlane(const DicomHeader& slice) {
-  const Eigen::Vector3d& row = *slice.row_direction;
-  const Eigen::Vector3d& column = *slice.column_direction;
+  const Eigen::Vector3d row = slice.axes->col(0);
+  const Eigen::Vector3d column = slice.axes->col(1);
   if (std::abs(row.norm() - 1) > kSameDirection || std::abs(column.norm() - 1) > kSameDirection ||
       std::abs(row.dot(column)) > kSameDirection) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -244,8 +242,8 @@ absl::Status ArrangeStack(bool has_offset, DicomStack* stack) {
     return absl::InvalidArgumentError(absl::StrCat(
         "the series has ", slices.size(), " slices; a volume needs at least ", kLeastSlices));
   }
-  const Eigen::Vector3d row = slices.front().row_direction->normalized();
-  const Eigen::Vector3d column = slices.front().column_direction->normalized();
+  const Eigen::Vector3d row = Eigen::Vector3d(slices.front().axes->col(0)).normalized();
+  const Eigen::Vector3d column = Eigen::Vector3d(slices.front().axes->col(1)).normalized();
   const Eigen::Vector3d normal = row.cross(column);
   SortAlong(normal, &slices);
   const std::vector<double> gaps = Gaps(Heights(slices, normal));

@@ -68,10 +68,13 @@ Folder ReadHeaders(const std::vector<std::string>& paths) {
 absl::StatusOr<SeriesChoice> ChoiceOf(const std::string& path, const Folder& folder,
                                       const CtReadOptions& options) {
   if (std::filesystem::is_directory(path)) {
-    return SeriesChoice{0, options.series_number, options.join_series};
+    return SeriesChoice{0, options.series_number, options.join_series,
+                        options.hu_offset.has_value()};
   }
   for (const DicomHeader& file : folder.files) {
-    if (file.path == path) return SeriesChoice{file.file_number, std::nullopt, options.join_series};
+    if (file.path != path) continue;
+    return SeriesChoice{file.file_number, std::nullopt, options.join_series,
+                        options.hu_offset.has_value()};
   }
   return absl::InvalidArgumentError(
       "the file is not a DICOM file, and its ending is not .nii .nii.gz .nrrd .nhdr .mha or .mhd");

@@ -109,8 +109,7 @@ struct Parting {
 class Separator {
  public:
   explicit Separator(const std::vector<DicomHeader>& slices) : slices_(slices) {
-    const DicomHeader& first = slices.front();
-    const Eigen::Vector3d normal = first.row_direction->cross(*first.column_direction);
+    const Eigen::Vector3d normal = SliceNormal(slices.front());
     for (size_t i = 0; i < slices.size(); ++i) {
       stack_.push_back({slices[i].position_mm->dot(normal), i});
     }
@@ -125,7 +124,7 @@ class Separator {
     TryText(&DicomHeader::reconstruction, "reconstruction (kernel, voltage or phase)");
     Try(LabelsOfJumps(slices_, &DicomHeader::series_time_s, 0.5), "series time");
     TryText(&DicomHeader::study_uid, "study");
-    TryText(&DicomHeader::frame_of_reference, "frame of reference");
+    TryText(&DicomHeader::frame_uid, "frame of reference");
     TryText(&DicomHeader::series_uid, "series");
     TryTime(&DicomHeader::acquisition_time_s, "acquisition time");
     TryTime(&DicomHeader::content_time_s, "content time");
@@ -174,9 +173,9 @@ class Separator {
 
 bool HaveHeights(const std::vector<DicomHeader>& slices) {
   return std::all_of(slices.begin(), slices.end(), [](const DicomHeader& slice) {
-    return slice.position_mm && slice.row_direction && slice.position_mm->allFinite() &&
-           std::isfinite(slice.position_mm->squaredNorm()) && slice.row_direction->norm() < 2 &&
-           slice.column_direction->norm() < 2;
+    return slice.position_mm && slice.axes && slice.position_mm->allFinite() &&
+           std::isfinite(slice.position_mm->squaredNorm()) && slice.axes->col(0).norm() < 2 &&
+           slice.axes->col(1).norm() < 2;
   });
 }
 

@@ -23,15 +23,13 @@ constexpr double kLongestStep = 1.5;
 using Fits = std::function<bool(const SliceGroup& a, const SliceGroup& b)>;
 
 bool HasPlace(const DicomHeader& slice) {
-  return slice.kind == DicomKind::kCtSlice && slice.position_mm && slice.row_direction &&
+  return slice.kind == DicomKind::kCtSlice && slice.position_mm && slice.axes &&
          slice.pixel_spacing_mm;
 }
 
 bool AreAlike(const DicomHeader& a, const DicomHeader& b) {
   return a.patient == b.patient && a.rows == b.rows && a.columns == b.columns &&
-         (*a.row_direction - *b.row_direction).norm() <= kSameDirection &&
-         (*a.column_direction - *b.column_direction).norm() <= kSameDirection &&
-         a.pixel_spacing_mm->isApprox(*b.pixel_spacing_mm, kSameDirection) &&
+         HaveSameAxes(a, b) && a.pixel_spacing_mm->isApprox(*b.pixel_spacing_mm, kSameDirection) &&
          a.rescale_slope == b.rescale_slope && a.rescale_intercept == b.rescale_intercept &&
          a.patient_position == b.patient_position;
 }
@@ -45,6 +43,10 @@ bool IsUniform(const SliceGroup& group) {
          });
 }
 
+bool HasPlaces(const SliceGroup& group) {
+  return std::all_of(group.slices.begin(), group.slices.end(), HasPlace);
+}
+
 bool IsWhole(const SliceGroup& group) { return group.slices.size() >= kLeastSlices; }
 
 bool AreOfOneImage(const SliceGroup& a, const SliceGroup& b) {
@@ -52,8 +54,8 @@ bool AreOfOneImage(const SliceGroup& a, const SliceGroup& b) {
 }
 
 bool ShareFrame(const SliceGroup& a, const SliceGroup& b) {
-  const std::string& frame = a.slices.front().frame_of_reference;
-  return !frame.empty() && frame == b.slices.front().frame_of_reference;
+  const std::string& frame = a.slices.front().frame_uid;
+  return !frame.empty() && frame == b.slices.front().frame_uid;
 }
 
 std::vector<double> HeightsOf(const SliceGroup& group, const Eigen::Vector3d& normal) {
@@ -61,11 +63,6 @@ std::vector<double> HeightsOf(const SliceGroup& group, const Eigen::Vector3d& no
   for (const DicomHeader& slice : group.slices) heights.push_back(slice.position_mm->dot(normal));
   std::sort(heights.begin(), heights.end());
   return heights;
-}
-
-Eigen::Vector3d NormalOf(const SliceGroup& group) {
-  const DicomHeader& first = group.slices.front();
-  return first.row_direction->cross(*first.column_direction);
 }
 
 double UsualStep(const std::vector<double>& heights) {
@@ -78,7 +75,7 @@ double UsualStep(const std::vector<double>& heights) {
 }
 
 bool FollowEachOther(const SliceGroup& a, const SliceGroup& b) {
-  const Eigen::Vector3d normal = NormalOf(a);
+  const Eigen::Vector3d normal = SliceNormal(a.slices.front());
   const std::vector<double> of_a = HeightsOf(a, normal);
   const std::vector<double> of_b = HeightsOf(b, normal);
   const double between = std::max(of_b.front() - of_a.back(), of_a.front() - of_b.back());
@@ -177,14 +174,19 @@ std::vector<SliceGroup> GroupBySeries(const std::vector<DicomHeader>& files) {
   return groups;
 }
 
+bool HaveSameAxes(const DicomHeader& a, const DicomHeader& b) {
+  return (*a.axes - *b.axes).colwise().norm().maxCoeff() <= kSameDirection;
+}
+
 bool CanBeOneVolume(const SliceGroup& a, const SliceGroup& b) {
   return HasPlace(a.slices.front()) && HasPlace(b.slices.front()) &&
          AreAlike(a.slices.front(), b.slices.front());
 }
 
 bool AreApart(const SliceGroup& a, const SliceGroup& b) {
-  const std::vector<double> of_a = HeightsOf(a, NormalOf(a));
-  const std::vector<double> of_b = HeightsOf(b, NormalOf(a));
+  if (!HasPlaces(a) || !HasPlaces(b)) return false;
+  const std::vector<double> of_a = HeightsOf(a, SliceNormal(a.slices.front()));
+  const std::vector<double> of_b = HeightsOf(b, SliceNormal(a.slices.front()));
   return of_a.back() < of_b.front() || of_b.back() < of_a.front();
 }
 

@@ -23,10 +23,13 @@ struct SliceGroup {
 // By patient and series, in the order of their numbers and first files.
 std::vector<SliceGroup> GroupBySeries(const std::vector<DicomHeader>& files);
 
+// Within what rounding in decimal headers leaves. REQUIRES: axes.
+bool HaveSameAxes(const DicomHeader& a, const DicomHeader& b);
+
 // Of one patient, size, orientation, pixel spacing, rescale and patient position, all with a place.
 bool CanBeOneVolume(const SliceGroup& a, const SliceGroup& b);
 
-// Whether the places of two such groups follow each other and none lies between those of the other.
+// Whether all slices of two such groups have places, and those of one follow those of the other.
 bool AreApart(const SliceGroup& a, const SliceGroup& b);
 
 // Joins groups that are one CT although their files name several series. What differs in patient,

@@ -20,8 +20,11 @@ inline constexpr absl::string_view kLegacyEnhancedCtImageClass = "1.2.840.10008.
 // of a series that a plan is built of.
 bool IsCtClass(absl::string_view class_uid);
 
+// Farther away nothing is scanned; sums of squares stay finite.
+inline constexpr double kMaxPositionMm = 1e5;
+
 // What the choice of a series reads from the header of an image, whichever library has read the
-// file. Texts are UTF-8 and trimmed; empty where the image says nothing. Several values have "\\"
+// file. Texts are trimmed, and empty where the image says nothing. Several values have "\\"
 // between.
 struct ImageHeader {
   std::string study_uid = {};
@@ -32,16 +35,15 @@ struct ImageHeader {
   std::string modality = {};
   std::string series_description = {};
   std::string convolution_kernel = {};
-  std::string image_type = {};  // "ORIGINAL\\PRIMARY\\AXIAL"
-  std::string contrast = {};    // the agent
-  int series_number = 0;
-  int acquisition_number = 0;
-  int instance_number = 0;
+  std::string image_type = {};            // "ORIGINAL\\PRIMARY\\AXIAL"
+  std::string contrast = {};              // the agent
+  std::optional<int> series_number = {};  // 0 is a number, too
+  std::optional<int> acquisition_number = {};
+  std::optional<int> instance_number = {};
 
   int rows = 0;
   int columns = 0;
-  int frames = 1;
-  std::optional<Eigen::Vector3d> position = {};          // mm, LPS: centre of the first pixel
+  std::optional<Eigen::Vector3d> position_mm = {};       // LPS: centre of the first pixel
   std::optional<Eigen::Matrix<double, 3, 2>> axes = {};  // along a row, along a column
   std::optional<Eigen::Vector2d> pixel_spacing_mm = {};  // between rows, between columns
   std::optional<double> slice_thickness_mm = {};
@@ -49,5 +51,10 @@ struct ImageHeader {
   std::optional<double> rescale_intercept = {};
   std::string rescale_type = {};
 };
+
+bool IsLocaliser(const ImageHeader& image);
+
+// Row direction x column direction, as long as the header makes it. REQUIRES: axes.
+Eigen::Vector3d SliceNormal(const ImageHeader& image);
 
 }  // namespace tissueform

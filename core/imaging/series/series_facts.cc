@@ -13,7 +13,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_format.h"
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 
 #include "core/imaging/series/image_header.h"
 
@@ -30,10 +30,15 @@ constexpr double kSameDirection = 1e-4;
 const double kAxialCosine = std::cos(31.0 * M_PI / 180.0);
 // A place is missing where the next image is farther than so many spacings.
 constexpr double kGapSpacings = 1.5;
-Vector3d NormalOf(const ImageHeader& image) {
-  const Vector3d row = image.axes->col(0);
-  const Vector3d column = image.axes->col(1);
-  const Vector3d normal = row.cross(column);
+
+// Whether position and axes can be calculated with: a header may hold any number.
+bool HasPlace(const ImageHeader& image) {
+  return image.position_mm && image.position_mm->cwiseAbs().maxCoeff() <= kMaxPositionMm &&
+         image.axes && image.axes->cwiseAbs().maxCoeff() < 2;
+}
+
+Vector3d UnitNormalOf(const ImageHeader& image) {
+  const Vector3d normal = SliceNormal(image);
   const double length = normal.norm();
   return length > 0 ? Vector3d(normal / length) : Vector3d::UnitZ();
 }
@@ -50,13 +55,13 @@ std::vector<double> PlacesOf(const std::vector<ImageHeader>& images, SeriesFacts
   std::vector<Vector3d> normals;
   std::vector<double> places;
   for (const ImageHeader& image : images) {
-    if (!image.position.has_value() || !image.axes.has_value()) continue;
-    const Vector3d normal = NormalOf(image);
+    if (!HasPlace(image)) continue;
+    const Vector3d normal = UnitNormalOf(image);
     const auto same = [&normal](const Vector3d& known) {
       return known.dot(normal) > 1 - kSameDirection;
     };
     if (std::none_of(normals.begin(), normals.end(), same)) normals.push_back(normal);
-    places.push_back(normals.front().dot(*image.position));
+    places.push_back(normals.front().dot(*image.position_mm));
   }
   std::sort(places.begin(), places.end());
   facts->orientations = static_cast<int>(normals.size());
@@ -88,11 +93,6 @@ void MeasurePlaces(const std::vector<double>& places, SeriesFacts* facts) {
           static_cast<int>(std::min(std::round(step / facts->spacing_mm) - 1, 100'000.0));
     }
   }
-}
-
-bool IsLocaliser(const ImageHeader& image) {
-  return absl::StrContains(image.image_type, "LOCALIZER") ||
-         absl::StrContains(image.image_type, "SCOUT");
 }
 
 // SOP class, and whether it is a scout.
@@ -133,7 +133,7 @@ SeriesFacts FactsOfSeries(const std::string& key, const std::vector<ImageHeader>
                        .study_uid = first.study_uid,
                        .modality = first.modality,
                        .description = first.series_description,
-                       .number = first.series_number,
+                       .number = first.series_number.value_or(0),
                        .images = static_cast<int>(images.size()),
                        .set_aside = static_cast<int>(objects.size() - images.size()),
                        .thickness_mm = first.slice_thickness_mm.value_or(0),

@@ -79,8 +79,9 @@ void CheckHounsfield(const SeriesFacts& series, std::vector<std::string>* agains
                          ? absl::StrCat(series.without_hounsfield, " of its ", series.images,
                                         " images have no Hounsfield calibration, the others "
                                         "have one; send the series again")
-                         : "it has no Hounsfield calibration, like some cone-beam CTs; a "
-                           "rule with \"hounsfield\": false and a recipe with hu_offset accept it");
+                         : "it has no Hounsfield calibration, like some cone-beam CTs; a recipe "
+                           "with hu_offset accepts it (in the bridge with a rule that has "
+                           "\"hounsfield\": false)");
 }
 
 }  // namespace

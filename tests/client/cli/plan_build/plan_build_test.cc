@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstdlib>
+#include <filesystem>
 #include <unistd.h>
 
 #include "absl/strings/str_cat.h"
@@ -237,6 +239,46 @@ TEST_F(PlanBuildTest, UnusableCtIsRefused) {
   Write("recipe.json", Recipe(R"("ct": {"axes": "RPI"}, )"));
   EXPECT_THAT(Build(), FailsWith(1, HasSubstr("\"hu_offset\": -1024")));
   EXPECT_THAT(Files(), ElementsAre("empty", "recipe.json"));
+}
+
+// Writes the bundled head by pydicom: soft (series 2, study 2.25.1) and bone (series 1), by study.
+std::string SoftAndBone(const std::string& folder, const std::string& study_of_bone) {
+  return absl::StrCat("/usr/bin/python3 -B -c '\n",
+                      "import os, sys\n"
+                      "sys.path.insert(0, \"",
+                      SourcePath("deploy/pacs"),
+                      "\")\n"
+                      "import head_series\n"
+                      "def bone(image, index):\n"
+                      "  image.SeriesNumber, image.ConvolutionKernel = 1, \"H70h\"\n"
+                      "def write(name, **words):\n"
+                      "  head_series.write_series(name, name=\"Planted^Pat\", **words)\n"
+                      "  for file in os.listdir(name):\n"
+                      "    os.rename(name + \"/\" + file, \"",
+                      folder,
+                      "/\" + name[-4:] + file)\n"
+                      "write(\"",
+                      folder, "/../soft\", study=\"2.25.1\")\nwrite(\"", folder,
+                      "/../bone\", study=\"", study_of_bone, "\", alter=bone)\n'");
+}
+
+TEST_F(PlanBuildTest, SoftSeriesOfAStudyIsChosenAndStudiesAreNotMixed) {
+  if (std::system("/usr/bin/python3 -c 'import numpy, pydicom' 2>/dev/null") != 0) {
+    GTEST_SKIP() << "python3-pydicom is not installed";
+  }
+  std::filesystem::create_directory(folder_ / "ct");
+  Write("recipe.json", Recipe(""));
+  ASSERT_EQ(std::system(SoftAndBone((folder_ / "ct").string(), "2.25.1").c_str()), 0);
+  const ProcessResult made =
+      BuildFrom("ct", {"--out", "head", "--no-pictures", "--accept-defects"});
+  ASSERT_THAT(made, Succeeds());
+  EXPECT_THAT(made.out,
+              AllOf(HasSubstr("CT      chosen of 2 CT series of one study: series 2 (93 axial"),
+                    HasSubstr("not series 1: the chosen series has a softer kernel"),
+                    Not(HasSubstr("Planted"))));
+  ASSERT_EQ(std::system(SoftAndBone((folder_ / "ct").string(), "2.25.2").c_str()), 0);
+  EXPECT_THAT(BuildFrom("ct", {"--out", "other"}),
+              FailsWith(1, HasSubstr("the default rule does not choose between studies")));
 }
 
 // The bundled CT without its lowest slices, as a volume that says all of itself.

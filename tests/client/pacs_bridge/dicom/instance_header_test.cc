@@ -55,8 +55,9 @@ TEST(InstanceHeader, SaysWhatTheSliceSays) {
   EXPECT_EQ(header->instance_number, 3);
   EXPECT_EQ(header->rows, 48);
   EXPECT_EQ(header->columns, 64);
-  ASSERT_TRUE(header->position && header->axes && header->pixel_spacing_mm);
-  EXPECT_NEAR((*header->position - (options.origin_mm + Eigen::Vector3d(6, 0, 0))).norm(), 0, 1e-9);
+  ASSERT_TRUE(header->position_mm && header->axes && header->pixel_spacing_mm);
+  EXPECT_NEAR((*header->position_mm - (options.origin_mm + Eigen::Vector3d(6, 0, 0))).norm(), 0,
+              1e-9);
   EXPECT_NEAR((*header->axes - options.axes.leftCols<2>()).norm(), 0, 1e-9);
   EXPECT_EQ(header->rescale_intercept, -1024);
   EXPECT_FALSE(header->gantry_tilt_deg);

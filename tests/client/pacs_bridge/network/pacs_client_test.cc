@@ -250,7 +250,7 @@ TEST_P(PacsClientTest, WhatIsStoredIsFoundAndComesBackToTheLastBit) {
   EXPECT_EQ(fetched->failed, 0);
   ASSERT_THAT(sink_.instances(), SizeIs(3));
   for (const ReceivedInstance& instance : sink_.instances()) {
-    const size_t number = static_cast<size_t>(instance.header.instance_number - 1);
+    const size_t number = static_cast<size_t>(instance.header.instance_number.value() - 1);
     EXPECT_EQ(DataSetOfFile(instance.path), DataSetOfFile(series.files[number]));
   }
 }

@@ -35,7 +35,7 @@ std::vector<ImageHeader> Head(int slices = 200, double spacing_mm = 0.8) {
     image.image_type = "ORIGINAL\\PRIMARY\\AXIAL";
     image.series_number = 2;
     image.instance_number = i + 1;
-    image.position = Eigen::Vector3d(-100, -100, i * spacing_mm);
+    image.position_mm = Eigen::Vector3d(-100, -100, i * spacing_mm);
     image.axes = Eigen::Matrix<double, 3, 2>::Identity();
     image.slice_thickness_mm = spacing_mm;
     image.rescale_slope = 1;
@@ -141,7 +141,7 @@ INSTANTIATE_TEST_SUITE_P(
                  for (ImageHeader& image : *i) {
                    image.class_uid = std::string(kEnhancedCtImageClass);
                    image.rescale_slope.reset();
-                   image.position.reset();
+                   image.position_mm.reset();
                  }
                },
                "multi-frame (Enhanced CT)"},
@@ -157,7 +157,7 @@ INSTANTIATE_TEST_SUITE_P(
                "cone-beam"},
         Defect{"NoPlaces",
                [](Images* i) {
-                 for (ImageHeader& image : *i) image.position.reset();
+                 for (ImageHeader& image : *i) image.position_mm.reset();
                },
                "it has 0 slices"}),
     [](const auto& defect) { return std::string(defect.param.name); });
