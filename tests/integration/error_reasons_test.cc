@@ -15,40 +15,10 @@
 namespace tissueform::testing {
 namespace {
 
-MATCHER_P(Because, reason, std::string(ReasonName(reason))) {
-  *result_listener << GetStatus(arg).ToString();
-  return HasReason(GetStatus(arg), reason);
-}
-
 class ErrorReasonsTest : public ServiceTest {
  protected:
   const BarProblem problem_{5};
 };
-
-TEST_F(ErrorReasonsTest, WhatIsNotThere) {
-  const auto client = Connect();
-  EXPECT_THAT(client->GetSession("sessions/none"), Because(ErrorReason::kSessionNotFound));
-  EXPECT_THAT(client->DeleteSession("sessions/none"), Because(ErrorReason::kSessionNotFound));
-  EXPECT_THAT(client->OpenStream("sessions/none", {}), Because(ErrorReason::kSessionNotFound));
-  const std::string mesh = "meshes/" + std::string(64, '0');
-  EXPECT_THAT(client->DeleteMesh(mesh), Because(ErrorReason::kMeshNotFound));
-  EXPECT_THAT(client->CreateSession(problem_.Request(mesh)), Because(ErrorReason::kMeshNotFound));
-}
-
-TEST_F(ErrorReasonsTest, IdsThatAreInUse) {
-  const auto client = Connect();
-  ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh,
-                       client->UploadMesh(problem_.mesh, problem_.CellArrays()));
-  SessionRequest request = problem_.Request(mesh.name());
-  request.request_id = "one";
-  request.session_id = "0123456789abcdef";
-  ASSERT_THAT(client->CreateSession(request), IsOk());
-  request.request_id = "another";
-  EXPECT_THAT(client->CreateSession(request), Because(ErrorReason::kSessionIdTaken));
-  request.request_id = "one";
-  request.poisson_ratio = 0.3;
-  EXPECT_THAT(client->CreateSession(request), Because(ErrorReason::kRequestIdReused));
-}
 
 TEST_F(ErrorReasonsTest, WhatTheServerHasNoRoomFor) {
   ServerOptions options = TestOptions();

@@ -25,11 +25,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-MATCHER_P(SaidBecause, reason, std::string(ReasonName(reason))) {
-  *result_listener << GetStatus(arg).ToString();
-  return HasReason(GetStatus(arg), reason);
-}
-
 // No file of it is needed: a server takes a prediction's case as it is told.
 const std::string kCase = "cases/" + std::string(64, 'c');
 
@@ -100,7 +95,7 @@ TEST_F(ExportsTest, AnExportIsWhatWasAskedAndGoesForwardOnly) {
   EXPECT_EQ(changed.stored_objects(), 3);
   EXPECT_EQ(changed.detail(), "3 of 6");
   EXPECT_NE(changed.etag(), made.etag());
-  EXPECT_THAT(exports().Update(storing), SaidBecause(ErrorReason::kStaleEtag));
+  EXPECT_THAT(exports().Update(storing), Because(ErrorReason::kStaleEtag));
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_WAITING)),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("invalid change of state")));
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORED)), IsOk());
@@ -132,7 +127,7 @@ TEST_F(ExportsTest, OneOfAPredictionThatIsNotDoneIsGivenAgainAndADoneOneIsNot) {
   ASSERT_OK_AND_ASSIGN(const v1::Export repeated, exports().Create(prediction, {}, "second"));
   EXPECT_EQ(repeated.name(), other.name()) << "the same request, done or not";
   EXPECT_THAT(exports().Create(prediction, {SomeMeasure()}, "second"),
-              SaidBecause(ErrorReason::kRequestIdReused));
+              Because(ErrorReason::kRequestIdReused));
   const std::string second = Predict(2);
   ASSERT_OK_AND_ASSIGN(const v1::Export of_second, exports().Create(second));
   ASSERT_OK_AND_ASSIGN(const auto all, exports().List());
@@ -174,12 +169,12 @@ TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
   EXPECT_THAT(exports().Create(prediction, many), IsOk());
   EXPECT_THAT(exports().Create(Predict(2), {}, std::string(65, 'x')),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("request_id")));
-  EXPECT_THAT(exports().Create("predictions/none"), SaidBecause(ErrorReason::kPredictionNotFound));
+  EXPECT_THAT(exports().Create("predictions/none"), Because(ErrorReason::kPredictionNotFound));
   EXPECT_THAT(exports().Create("none"), StatusIs(absl::StatusCode::kInvalidArgument));
   EXPECT_THAT(exports().Create(Predict(3, "")),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("has no case")));
-  EXPECT_THAT(exports().Get("exports/none"), SaidBecause(ErrorReason::kExportNotFound));
-  EXPECT_THAT(exports().Delete("exports/none"), SaidBecause(ErrorReason::kExportNotFound));
+  EXPECT_THAT(exports().Get("exports/none"), Because(ErrorReason::kExportNotFound));
+  EXPECT_THAT(exports().Delete("exports/none"), Because(ErrorReason::kExportNotFound));
   ASSERT_OK_AND_ASSIGN(const auto all, exports().List());
   ASSERT_THAT(all, SizeIs(1));
   EXPECT_THAT(exports().Update(Change(all[0].name(), v1::EXPORT_STATE_UNSPECIFIED)),
@@ -211,7 +206,7 @@ TEST_F(ExportsTest, AWatchTellsWhatWaitsThenEveryChangeAndEndsWithTheServer) {
   EXPECT_EQ(told->export_().name(), later.name());
   std::thread drain([this] { server().Drain(); });
   EXPECT_EQ(watch->Receive(), std::nullopt);
-  EXPECT_THAT(watch->Finish(), SaidBecause(ErrorReason::kServerDraining));
+  EXPECT_THAT(watch->Finish(), Because(ErrorReason::kServerDraining));
   drain.join();
 }
 
@@ -219,9 +214,9 @@ TEST_F(ExportsTest, WhatIsTakenBackOrLosesItsPredictionIsGone) {
   const std::string prediction = Predict(1);
   ASSERT_OK_AND_ASSIGN(const v1::Export made, exports().Create(prediction));
   EXPECT_THAT(exports().Delete(made.name()), IsOk());
-  EXPECT_THAT(exports().Get(made.name()), SaidBecause(ErrorReason::kExportNotFound));
+  EXPECT_THAT(exports().Get(made.name()), Because(ErrorReason::kExportNotFound));
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORED)),
-              SaidBecause(ErrorReason::kExportNotFound));
+              Because(ErrorReason::kExportNotFound));
   ASSERT_OK_AND_ASSIGN(const v1::Export again, exports().Create(prediction));
   EXPECT_NE(again.name(), made.name());
   ASSERT_THAT(client_->predictions().Delete(prediction), IsOk());
@@ -238,18 +233,18 @@ TEST_F(ExportsTest, TooManyAreRefusedAndRoomComesBack) {
   ASSERT_OK_AND_ASSIGN(const v1::Export first, exports().Create(Predict(1)));
   ASSERT_THAT(exports().Create(Predict(2)), IsOk());
   const std::string third = Predict(3);
-  EXPECT_THAT(exports().Create(third), SaidBecause(ErrorReason::kTooManyExports));
+  EXPECT_THAT(exports().Create(third), Because(ErrorReason::kTooManyExports));
   ASSERT_THAT(exports().Update(Change(first.name(), v1::EXPORT_STATE_STORED)), IsOk());
   ASSERT_OK_AND_ASSIGN(const v1::Export of_third, exports().Create(third));
   ASSERT_THAT(exports().Update(Change(of_third.name(), v1::EXPORT_STATE_STORED)), IsOk());
-  EXPECT_THAT(exports().Create(Predict(4)), SaidBecause(ErrorReason::kTooManyExports)) << "kept";
+  EXPECT_THAT(exports().Create(Predict(4)), Because(ErrorReason::kTooManyExports)) << "kept";
   ASSERT_THAT(exports().Delete(first.name()), IsOk());
   EXPECT_THAT(exports().Create(Predict(4)), IsOk());
   const auto watch = exports().Watch();
   ASSERT_TRUE(watch->Receive().has_value());
   const auto other = exports().Watch();
   EXPECT_EQ(other->Receive(), std::nullopt);
-  EXPECT_THAT(other->Finish(), SaidBecause(ErrorReason::kTooManyWatches));
+  EXPECT_THAT(other->Finish(), Because(ErrorReason::kTooManyWatches));
   watch->Cancel();
   EXPECT_TRUE(Eventually([this] { return server().export_watches().size() == 0; }));
 }

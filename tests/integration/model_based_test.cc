@@ -73,11 +73,13 @@ Steps DrawSteps(uint32_t seed, int count) {
   std::mt19937 random(seed);
   std::vector<const Kind*> drawn;
   for (const Kind& kind : kKinds) drawn.insert(drawn.end(), kind.weight, &kind);
-  Steps steps;
+  // Both meshes first: without them most calls would be refused for want of one.
+  Steps steps = {{.kind = &kKinds[0], .numbers = {0}}, {.kind = &kKinds[0], .numbers = {1}}};
   for (int i = 0; i < count; ++i) {
     Step step{.kind = drawn[random() % drawn.size()], .numbers = {}};
     for (uint32_t& number : step.numbers) number = static_cast<uint32_t>(random());
-    steps.push_back(step);
+    // Now and then as a client calls again whose answer was lost: request ids are for that.
+    steps.push_back(random() % 4 == 0 ? steps.back() : step);
   }
   return steps;
 }
@@ -186,7 +188,7 @@ class ModelBasedTest : public ::testing::TestWithParam<int> {};
 
 TEST_P(ModelBasedTest, EveryAnswerIsThatOfPlainMaps) {
   const int seeds = FromEnvironment("TISSUEFORM_MODEL_SEEDS", 2 * kParts);
-  const int count = FromEnvironment("TISSUEFORM_MODEL_STEPS", 150);
+  const int count = FromEnvironment("TISSUEFORM_MODEL_STEPS", 200);
   for (int seed = GetParam(); seed <= seeds; seed += kParts) {
     const Steps steps = DrawSteps(static_cast<uint32_t>(seed), count);
     ModelRun run;

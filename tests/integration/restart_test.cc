@@ -113,33 +113,6 @@ TEST_F(RestartTest, ADragGoesOnThroughKillAndRestart) {
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("1 session")));
 }
 
-TEST_F(RestartTest, APredictionMadeTodayIsReadAndComparedTomorrow) {
-  ASSERT_NO_FATAL_FAILURE(Start());
-  v1::Prediction made;
-  {
-    const std::unique_ptr<TissueformClient> client = Connect();
-    const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");
-    ASSERT_OK_AND_ASSIGN(
-        made, client->predictions().Create(session.name(), TopPose(SomePose(2)), {}, "request"));
-  }
-  ASSERT_NO_FATAL_FAILURE(Kill());
-  ASSERT_NO_FATAL_FAILURE(Start());
-  const std::unique_ptr<TissueformClient> client = Connect();
-  PredictionCalls& calls = client->predictions();
-  ASSERT_OK_AND_ASSIGN(const v1::Prediction kept, calls.Get(made.name()));
-  EXPECT_EQ(kept.DebugString(), made.DebugString());
-  ASSERT_OK_AND_ASSIGN(const Positions positions, calls.ReadPositions(made.name()));
-  EXPECT_LT((positions - bar_.Solve(SomePose(2))).cwiseAbs().maxCoeff(), kFloat32Tolerance);
-  // The session comes back for it, and answers to the last bit what it has answered then.
-  ASSERT_OK_AND_ASSIGN(const ComparedPredictions compared,
-                       calls.Compare(made.name(), made.model()));
-  EXPECT_EQ(compared.comparison.distances().max_mm(), 0);
-  // The client has lost the answer and asks again.
-  ASSERT_OK_AND_ASSIGN(const v1::Prediction again,
-                       calls.Create(made.session(), TopPose(SomePose(2)), {}, "request"));
-  EXPECT_EQ(again.name(), made.name());
-}
-
 // Killed in the middle, with what QueryUpload has said before on the disk.
 TEST_F(RestartTest, AnUploadGoesOnThroughKillAndRestart) {
   ASSERT_NO_FATAL_FAILURE(Start());
@@ -258,15 +231,6 @@ TEST_F(RestartTest, WithoutItsFolderTheServerKeepsNothingSaysSoAndAnswersOn) {
                        DecodePositions(answer.positions(), bar_.mesh.num_vertices()));
   EXPECT_LT((positions - bar_.Solve(SomePose(3))).cwiseAbs().maxCoeff(), kFloat32Tolerance);
   EXPECT_THAT(server_.Drain(), IsOk());
-}
-
-TEST_F(RestartTest, ASecondServerIsRefusedTheFolder) {
-  ASSERT_NO_FATAL_FAILURE(Start());
-  EXPECT_THAT(ServerProcess::Start(ProgramPath("tissueform-server"),
-                                   {"--data-dir", server_.folder().string(), "--port", "0"},
-                                   std::chrono::seconds(60)),
-              StatusIs(absl::StatusCode::kUnavailable));
-  EXPECT_NE(Connect(), nullptr) << "the first one serves";
 }
 
 }  // namespace

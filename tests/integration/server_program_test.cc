@@ -260,6 +260,7 @@ TEST_F(ServerProgramTest, ATakenPortOrFolderIsOneLineAndTheEnd) {
   EXPECT_THAT(of_folder, HasSubstr("another server"));
   EXPECT_EQ(of_folder.find('\n'), of_folder.size() - 1) << of_folder;
   EXPECT_THAT(client_->GetServerInfo(), IsOk()) << "who was there serves on";
+  EXPECT_THAT(TissueformClient::Connect(holder->address(), {}), IsOk());
 }
 
 // gRPC 1.51 by itself is deaf for ever after this (CVE-2023-4785).

@@ -10,16 +10,19 @@
 #include <string>
 #include <vector>
 
+#include "gmock/gmock.h"
 #include "grpcpp/channel.h"
 #include "gtest/gtest.h"
 
 #include "client/cpp/tissueform_client.h"
+#include "core/base/error_reason.h"
 #include "core/mechanics/constraints/constraint_set.h"
 #include "core/mechanics/constraints/handle_pose.h"
 #include "core/mesh/payload/mesh_payload.h"
 #include "core/mesh/tet_mesh.h"
 #include "server/app/server_options.h"
 #include "server/app/tissueform_server.h"
+#include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {
 
@@ -45,6 +48,12 @@ std::vector<NamedPose> TopPose(const HandlePose& pose);
 
 // True as soon as `condition` holds; false when it does not within 30 s.
 bool Eventually(const std::function<bool()>& condition);
+
+// EXPECT_THAT(result, Because(ErrorReason::kMeshNotFound));
+MATCHER_P(Because, reason, std::string(ReasonName(reason))) {
+  *result_listener << GetStatus(arg).ToString();
+  return HasReason(GetStatus(arg), reason);
+}
 
 // Float32 rounding of coordinates of this size, and a little more.
 inline constexpr double kFloat32Tolerance = 1e-5;

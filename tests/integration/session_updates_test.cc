@@ -21,16 +21,6 @@ using ::testing::HasSubstr;
 
 class SessionUpdatesTest : public ServiceTest {
  protected:
-  // The session with these changes, made as a new one.
-  std::string FreshAnswer(TissueformClient* client, const SessionRequest& request) {
-    const absl::StatusOr<v1::Session> fresh = client->CreateSession(request);
-    EXPECT_THAT(fresh, IsOk());
-    if (!fresh.ok()) return "";
-    const auto answer = client->DeformOnce(fresh->name(), TopPose(SomePose(3)));
-    EXPECT_THAT(answer, IsOk());
-    return answer.ok() ? answer->positions() : "";
-  }
-
   v1::UpdateSessionRequest ToElastic(const v1::Session& session) {
     v1::UpdateSessionRequest request;
     request.set_name(session.name());
@@ -56,26 +46,6 @@ class SessionUpdatesTest : public ServiceTest {
 
   const BarProblem problem_{3};
 };
-
-TEST_F(SessionUpdatesTest, AnUpdatedSessionAnswersAsAFreshOneWould) {
-  const auto client = Connect();
-  const v1::Session before = MakeSession(client.get(), problem_);
-  ASSERT_OK_AND_ASSIGN(const v1::Session after, client->UpdateSession(ToElastic(before)));
-  EXPECT_EQ(after.name(), before.name());
-  EXPECT_NE(after.etag(), before.etag());
-  EXPECT_EQ(after.model(), v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
-  EXPECT_EQ(after.poisson_ratio(), 0.3);
-  EXPECT_EQ(after.state(), v1::SESSION_STATE_READY);
-  EXPECT_THAT(after.handles(), ElementsAre("top"));
-  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
-                       client->DeformOnce(after.name(), TopPose(SomePose(3))));
-  SessionRequest fresh = problem_.Request(before.mesh());
-  fresh.model = DeformationModel::kLinearElastic;
-  fresh.stiffness = 9000.0;
-  fresh.poisson_ratio = 0.3;
-  EXPECT_TRUE(answer.positions() == FreshAnswer(client.get(), fresh)) << "to the last bit";
-  EXPECT_EQ(client->GetSession(before.name())->etag(), after.etag());
-}
 
 TEST_F(SessionUpdatesTest, AnOpenDragGoesOnWithTheUpdatedSession) {
   const auto client = Connect();
@@ -115,7 +85,7 @@ TEST_F(SessionUpdatesTest, OtherHandlesEndADragWithAReason) {
   EXPECT_THAT(client->DeformOnce(session.name(), {{"crown", SomePose(1)}}), IsOk());
 }
 
-TEST_F(SessionUpdatesTest, WhatIsRefused) {
+TEST_F(SessionUpdatesTest, WhatIsRefusedSaysWhyAndChangesNothing) {
   const auto client = Connect();
   const v1::Session session = MakeSession(client.get(), problem_);
   v1::UpdateSessionRequest request;
@@ -123,17 +93,9 @@ TEST_F(SessionUpdatesTest, WhatIsRefused) {
   EXPECT_THAT(client->UpdateSession(request),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("changes nothing")));
   request = ToElastic(session);
-  request.set_etag("of another time");
-  const absl::Status stale = client->UpdateSession(request).status();
-  EXPECT_EQ(stale.code(), absl::StatusCode::kAborted);
-  EXPECT_TRUE(HasReason(stale, ErrorReason::kStaleEtag)) << stale;
-  request = ToElastic(session);
   request.mutable_stiffness()->set_cell_array("none of that name");
   EXPECT_THAT(client->UpdateSession(request),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("none of that name")));
-  request.set_name("sessions/none");
-  const absl::Status missing = client->UpdateSession(request).status();
-  EXPECT_TRUE(HasReason(missing, ErrorReason::kSessionNotFound)) << missing;
   request = ToOtherHandle(session);
   request.mutable_regions()->mutable_handles(0)->set_vertices(0, 1 << 20);
   EXPECT_THAT(client->UpdateSession(request), StatusIs(absl::StatusCode::kInvalidArgument));

@@ -155,22 +155,25 @@ class FakeReaderCall : public grpc::ServerCallbackReader<Request> {
   FakeReads<Request> reads_;
 };
 
-// A call whose server alone speaks. Every write is read at once unless the client has stopped.
+// Messages on their way from a reactor to a client. Each is read at once unless the client has
+// stopped.
 template <typename Response>
-class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
+class FakeWrites {
  public:
-  explicit FakeWriterCall(WorkerPool* pool) : state_(pool) {}
+  using OnWriteDone = std::function<void(bool)>;
 
-  void Bind(grpc::ServerWriteReactor<Response>* reactor) {
-    reactor_ = reactor;
-    this->BindReactor(reactor);
-    state_.Bind(reactor);
+  FakeWrites(FakeCallState* state, OnWriteDone done) : state_(state), done_(std::move(done)) {}
+
+  void Write(const Response* message) {
+    MutexLock lock(mutex_);
+    ++started_;
+    if (stalled_) {
+      stalled_write_ = message;
+    } else {
+      Complete(message);
+    }
   }
-  void Cancel() {
-    state_.Cancel();
-    ReadOn();
-  }
-  // From now on writes do not complete, until ReadOn.
+  // From now on writes do not complete, until ReadOn: the client does not read.
   void StopReading() {
     MutexLock lock(mutex_);
     stalled_ = true;
@@ -196,60 +199,88 @@ class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
     MutexLock lock(mutex_);
     return !responses_.empty();
   }
-  std::optional<grpc::Status> WaitUntilDone() { return state_.WaitUntilDone(); }
-
-  void Finish(grpc::Status status) override {
-    {
-      MutexLock lock(mutex_);
-      ended_ = true;
-      changed_.NotifyAll();
-    }
-    state_.Finish(std::move(status));  // last: the test may destroy this object afterwards
-  }
-  void SendInitialMetadata() override {
-    state_.React([this] { reactor_->OnSendInitialMetadataDone(!state_.cancelled()); });
-  }
-  void Write(const Response* message, grpc::WriteOptions) override {
+  int started() const {
     MutexLock lock(mutex_);
-    if (stalled_) {
-      stalled_write_ = message;
-    } else {
-      Complete(message);
-    }
+    return started_;
   }
-  void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
+  void End() {
+    MutexLock lock(mutex_);
+    ended_ = true;
+    changed_.NotifyAll();
+  }
 
  private:
-  grpc::internal::ServerReactor* reactor() override { return nullptr; }
-  void CallOnDone() override {}
-
   void Complete(const Response* message) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    state_.React([this, message] {
-      const bool ok = !state_.cancelled();
+    state_->React([this, message] {
+      const bool ok = !state_->cancelled();
       if (ok) {
         MutexLock lock(mutex_);
         responses_.push_back(*message);
         changed_.NotifyAll();
       }
-      reactor_->OnWriteDone(ok);
+      done_(ok);
     });
   }
 
-  grpc::ServerWriteReactor<Response>* reactor_ = nullptr;  // constant after Bind
-  FakeCallState state_;
+  FakeCallState* const state_;
+  const OnWriteDone done_;
   mutable Mutex mutex_;
   ConditionVariable changed_;
   std::deque<Response> responses_ ABSL_GUARDED_BY(mutex_);
   const Response* stalled_write_ ABSL_GUARDED_BY(mutex_) = nullptr;
   bool stalled_ ABSL_GUARDED_BY(mutex_) = false;
   bool ended_ ABSL_GUARDED_BY(mutex_) = false;
+  int started_ ABSL_GUARDED_BY(mutex_) = 0;
+};
+
+// A call whose server alone speaks.
+template <typename Response>
+class FakeWriterCall : public grpc::ServerCallbackWriter<Response> {
+ public:
+  explicit FakeWriterCall(WorkerPool* pool)
+      : state_(pool), writes_(&state_, [this](bool ok) { reactor_->OnWriteDone(ok); }) {}
+
+  void Bind(grpc::ServerWriteReactor<Response>* reactor) {
+    reactor_ = reactor;
+    this->BindReactor(reactor);
+    state_.Bind(reactor);
+  }
+  void Cancel() {
+    state_.Cancel();
+    writes_.ReadOn();
+  }
+  void StopReading() { writes_.StopReading(); }
+  void ReadOn() { writes_.ReadOn(); }
+  std::optional<Response> Receive() { return writes_.Receive(); }
+  bool HasUnread() const { return writes_.HasUnread(); }
+  std::optional<grpc::Status> WaitUntilDone() { return state_.WaitUntilDone(); }
+
+  void Finish(grpc::Status status) override {
+    writes_.End();
+    state_.Finish(std::move(status));  // last: the test may destroy this object afterwards
+  }
+  void SendInitialMetadata() override {
+    state_.React([this] { reactor_->OnSendInitialMetadataDone(!state_.cancelled()); });
+  }
+  void Write(const Response* message, grpc::WriteOptions) override { writes_.Write(message); }
+  void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
+
+ private:
+  grpc::internal::ServerReactor* reactor() override { return nullptr; }
+  void CallOnDone() override {}
+
+  grpc::ServerWriteReactor<Response>* reactor_ = nullptr;  // constant after Bind
+  FakeCallState state_;
+  FakeWrites<Response> writes_;
 };
 
 template <typename Request, typename Response>
 class FakeBidiCall : public grpc::ServerCallbackReaderWriter<Request, Response> {
  public:
   explicit FakeBidiCall(WorkerPool* pool)
-      : state_(pool), reads_(&state_, [this](bool ok) { reactor_->OnReadDone(ok); }) {}
+      : state_(pool),
+        reads_(&state_, [this](bool ok) { reactor_->OnReadDone(ok); }),
+        writes_(&state_, [this](bool ok) { reactor_->OnWriteDone(ok); }) {}
 
   void Bind(grpc::ServerBidiReactor<Request, Response>* reactor) {
     reactor_ = reactor;
@@ -261,86 +292,32 @@ class FakeBidiCall : public grpc::ServerCallbackReaderWriter<Request, Response> 
   void Cancel() {
     state_.Cancel();
     reads_.Close();
-    MutexLock lock(mutex_);
-    stalled_ = false;
-    if (stalled_write_ != nullptr) Complete(std::exchange(stalled_write_, nullptr));
+    writes_.ReadOn();
   }
-  // From now on writes do not complete, until ReadOn: the client does not read.
-  void StopReading() {
-    MutexLock lock(mutex_);
-    stalled_ = true;
-  }
-  void ReadOn() {
-    MutexLock lock(mutex_);
-    stalled_ = false;
-    if (stalled_write_ != nullptr) Complete(std::exchange(stalled_write_, nullptr));
-  }
-  // The next message of the server; empty when the call has ended, or after 30 s.
-  std::optional<Response> Receive() {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    MutexLock lock(mutex_);
-    while (responses_.empty() && !ended_) {
-      if (!changed_.WaitUntil(mutex_, deadline)) return std::nullopt;
-    }
-    if (responses_.empty()) return std::nullopt;
-    Response response = std::move(responses_.front());
-    responses_.pop_front();
-    return response;
-  }
-  int writes_started() const {
-    MutexLock lock(mutex_);
-    return writes_started_;
-  }
+  void StopReading() { writes_.StopReading(); }
+  void ReadOn() { writes_.ReadOn(); }
+  std::optional<Response> Receive() { return writes_.Receive(); }
+  int writes_started() const { return writes_.started(); }
   std::optional<grpc::Status> WaitUntilDone() { return state_.WaitUntilDone(); }
 
   void Finish(grpc::Status status) override {
-    {
-      MutexLock lock(mutex_);
-      ended_ = true;
-      changed_.NotifyAll();
-    }
+    writes_.End();
     reads_.Close();
     state_.Finish(std::move(status));  // last: the test may destroy this object afterwards
   }
   void SendInitialMetadata() override {}
   void Read(Request* target) override { reads_.Read(target); }
-  void Write(const Response* message, grpc::WriteOptions) override {
-    MutexLock lock(mutex_);
-    ++writes_started_;
-    if (stalled_) {
-      stalled_write_ = message;
-    } else {
-      Complete(message);
-    }
-  }
+  void Write(const Response* message, grpc::WriteOptions) override { writes_.Write(message); }
   void WriteAndFinish(const Response*, grpc::WriteOptions, grpc::Status) override {}
 
  private:
   grpc::internal::ServerReactor* reactor() override { return nullptr; }
   void CallOnDone() override {}
 
-  void Complete(const Response* message) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    state_.React([this, message] {
-      const bool ok = !state_.cancelled();
-      if (ok) {
-        MutexLock lock(mutex_);
-        responses_.push_back(*message);
-        changed_.NotifyAll();
-      }
-      reactor_->OnWriteDone(ok);
-    });
-  }
-
   grpc::ServerBidiReactor<Request, Response>* reactor_ = nullptr;  // constant after Bind
   FakeCallState state_;
   FakeReads<Request> reads_;
-  mutable Mutex mutex_;
-  ConditionVariable changed_;
-  std::deque<Response> responses_ ABSL_GUARDED_BY(mutex_);
-  bool stalled_ ABSL_GUARDED_BY(mutex_) = false;
-  const Response* stalled_write_ ABSL_GUARDED_BY(mutex_) = nullptr;
-  bool ended_ ABSL_GUARDED_BY(mutex_) = false;
-  int writes_started_ ABSL_GUARDED_BY(mutex_) = 0;
+  FakeWrites<Response> writes_;
 };
 
 }  // namespace tissueform::testing

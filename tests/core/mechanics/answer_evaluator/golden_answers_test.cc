@@ -58,9 +58,22 @@ Json Rounded(const std::vector<float>& values) {
   return rounded;
 }
 
-std::string ReadBytes(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
+std::string GoldenPath(const std::string& name, const char* suffix) {
+  return TestDataPath(absl::StrCat("prepared_answers/", name, suffix));
+}
+
+std::string ReadGolden(const std::string& name, const char* suffix) {
+  std::ifstream stream(GoldenPath(name, suffix), std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// Where TISSUEFORM_GOLDEN_ANSWERS says, if it says so.
+void WriteGolden(const std::string& name, const PortableAnswers& answers, const Json& file) {
+  const char* folder = std::getenv("TISSUEFORM_GOLDEN_ANSWERS");
+  if (folder == nullptr) return;
+  const std::string path = absl::StrCat(folder, "/", name);
+  std::ofstream(path + ".bin", std::ios::binary) << WriteAnswers(answers);
+  std::ofstream(path + ".json") << file.dump() << "\n";
 }
 
 class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
@@ -99,17 +112,12 @@ class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
       const bool covered = response_->Answer(poses, &positions).has_value();
       one["covered"] = covered;
       one["error_mm"] = AnswerEvaluator(response_->Describe()).ErrorMm(ToAnswerPoses(poses));
-      one["positions_mm"] = Json::array();
-      for (Eigen::Index i = 0; covered && i < positions.size(); ++i) {
-        one["positions_mm"].push_back(std::round(1e6 * double{positions.data()[i]}) / 1e6);
-      }
+      one["positions_mm"] = Rounded(
+          covered ? std::vector<float>(positions.data(), positions.data() + positions.size())
+                  : std::vector<float>());
       cases.push_back(std::move(one));
     }
     return cases;
-  }
-
-  static std::string PathOf(const std::string& folder, const char* suffix) {
-    return absl::StrCat(folder, "/", GetParam().name, suffix);
   }
 
   // Whether an evaluator gives what the cases tell.
@@ -135,18 +143,13 @@ class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
 };
 
 TEST_P(GoldenAnswersTest, AreWhatIsMadeToday) {
-  const std::string bytes = WriteAnswers(response_->Describe());
   const Json file = {{"answers", GetParam().name + ".bin"}, {"cases", MakeCases()}};
-  if (const char* folder = std::getenv("TISSUEFORM_GOLDEN_ANSWERS")) {
-    std::ofstream(PathOf(folder, ".bin"), std::ios::binary) << bytes;
-    std::ofstream(PathOf(folder, ".json")) << file.dump() << "\n";
-  }
-  const std::string golden = ReadBytes(TestDataPath(PathOf("prepared_answers", ".bin")));
+  WriteGolden(GetParam().name, response_->Describe(), file);
+  const std::string golden = ReadGolden(GetParam().name, ".bin");
   AnswerReading reading = ReadAnswers(golden);
   ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
   EXPECT_EQ(reading.answers.regions, response_->Describe().regions);
-  const Json golden_file =
-      Json::parse(ReadBytes(TestDataPath(PathOf("prepared_answers", ".json"))));
+  const Json golden_file = Json::parse(ReadGolden(GetParam().name, ".json"));
   EXPECT_EQ(golden_file["answers"], file["answers"]);
   // Kept bytes with kept and with new poses, new bytes with the kept ones.
   const AnswerEvaluator kept(std::move(reading.answers));
@@ -159,17 +162,6 @@ TEST_P(GoldenAnswersTest, AreWhatIsMadeToday) {
     EXPECT_NEAR(kept.ErrorMm(PosesOf(one["poses"])), error_mm, 1e-9 + 1e-6 * error_mm);
   }
   EXPECT_LT(golden.size() + golden_file.dump().size(), 300000U) << "under 1 MB together";
-}
-
-// By numpy alone, from the format's description.
-TEST_P(GoldenAnswersTest, AProgramThatIsNotOursGivesTheSame) {
-  const std::string command =
-      absl::StrCat("/usr/bin/python3 ",
-                   SourcePath("tests/core/mechanics/answer_evaluator/evaluate_golden_answers.py"),
-                   " ", TestDataPath(PathOf("prepared_answers", ".json")));
-  const int exit_code = WEXITSTATUS(std::system(command.c_str()));
-  if (exit_code == 77) GTEST_SKIP() << "numpy is not installed";
-  EXPECT_EQ(exit_code, 0);
 }
 
 // Linear elasticity with columns of the band, beside BandColumns.
@@ -218,18 +210,12 @@ class GoldenBandTest : public ::testing::Test {
 };
 
 TEST_F(GoldenBandTest, IsThatOfTheServer) {
-  const std::string bytes = WriteAnswers(answers_);
   const Json file = {{"answers", "linear_elastic_band.bin"}, {"cases", MakeCases()}};
-  if (const char* folder = std::getenv("TISSUEFORM_GOLDEN_ANSWERS")) {
-    std::ofstream(absl::StrCat(folder, "/linear_elastic_band.bin"), std::ios::binary) << bytes;
-    std::ofstream(absl::StrCat(folder, "/linear_elastic_band.json")) << file.dump() << "\n";
-  }
-  AnswerReading reading =
-      ReadAnswers(ReadBytes(TestDataPath("prepared_answers/linear_elastic_band.bin")));
+  WriteGolden("linear_elastic_band", answers_, file);
+  AnswerReading reading = ReadAnswers(ReadGolden("linear_elastic_band", ".bin"));
   ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
   const AnswerEvaluator kept(std::move(reading.answers));
-  const Json golden =
-      Json::parse(ReadBytes(TestDataPath("prepared_answers/linear_elastic_band.json")));
+  const Json golden = Json::parse(ReadGolden("linear_elastic_band", ".json"));
   for (const Json& cases : {golden["cases"], file["cases"]}) {
     ASSERT_EQ(cases.size(), 8U);
     EXPECT_EQ(cases.back()["band_mm"].size(), 0U);
@@ -246,16 +232,6 @@ TEST_F(GoldenBandTest, IsThatOfTheServer) {
   }
 }
 
-TEST_F(GoldenBandTest, AProgramThatIsNotOursGivesTheSame) {
-  const std::string command =
-      absl::StrCat("/usr/bin/python3 ",
-                   SourcePath("tests/core/mechanics/answer_evaluator/evaluate_golden_answers.py"),
-                   " ", TestDataPath("prepared_answers/linear_elastic_band.json"));
-  const int exit_code = WEXITSTATUS(std::system(command.c_str()));
-  if (exit_code == 77) GTEST_SKIP() << "numpy is not installed";
-  EXPECT_EQ(exit_code, 0);
-}
-
 TEST_F(GoldenBandTest, WhatDoesNotFitIsRefused) {
   PortableAnswers broken = answers_;
   broken.band_map.pop_back();
@@ -265,6 +241,25 @@ TEST_F(GoldenBandTest, WhatDoesNotFitIsRefused) {
   EXPECT_EQ(CheckAnswers(broken), "the band's sizes do not fit");
   EXPECT_TRUE(AnswerEvaluator(answers_).has_band());
 }
+
+class GoldenFileTest : public ::testing::TestWithParam<std::string> {};
+
+// By numpy alone, from the format's description.
+TEST_P(GoldenFileTest, AProgramThatIsNotOursGivesTheSame) {
+  const std::string command =
+      absl::StrCat("/usr/bin/python3 ",
+                   SourcePath("tests/core/mechanics/answer_evaluator/evaluate_golden_answers.py"),
+                   " ", GoldenPath(GetParam(), ".json"));
+  const int exit_code = WEXITSTATUS(std::system(command.c_str()));
+  if (exit_code == 77) GTEST_SKIP() << "numpy is not installed";
+  EXPECT_EQ(exit_code, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Files, GoldenFileTest,
+                         ::testing::Values("gradient_field", "linear_elastic",
+                                           "linear_elastic_band", "neo_hookean",
+                                           "neo_hookean_third_order"),
+                         [](const auto& test) { return test.param; });
 
 INSTANTIATE_TEST_SUITE_P(Models, GoldenAnswersTest, ::testing::ValuesIn(EvaluatedModels()),
                          [](const auto& test) { return test.param.name; });

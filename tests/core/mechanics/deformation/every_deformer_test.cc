@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <ostream>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
 #include "core/mechanics/deformation/create_deformer.h"
@@ -20,7 +22,12 @@
 namespace tissueform {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::IsOk;
+using testing::kInvalid;
 using testing::Pose;
+using testing::StatusIs;
 
 struct Case {
   std::string name;
@@ -29,6 +36,8 @@ struct Case {
   std::optional<double> rigid_tolerance_mm;
   // The same from an affine motion of the whole boundary.
   std::optional<double> affine_tolerance_mm;
+  // Whether it comes to its answer by many, which a caller may see.
+  bool iterates = false;
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
@@ -42,6 +51,11 @@ class EveryDeformerTest : public ::testing::TestWithParam<Case> {
 
 class RigidDeformerTest : public EveryDeformerTest {};
 class ElasticDeformerTest : public EveryDeformerTest {};
+class IteratingDeformerTest : public EveryDeformerTest {};
+
+double DistanceOf(const Positions& a, const Positions& b) {
+  return (a - b).rowwise().norm().maxCoeff();
+}
 
 // The largest distance of an answer from where `pose` puts each vertex.
 double DistanceFromPose(const MeshPreparation& preparation, const HandlePose& pose,
@@ -99,10 +113,70 @@ TEST_P(EveryDeformerTest, DoesNotDependOnThreads) {
   EXPECT_EQ(answers[0], answers[1]);
 }
 
+TEST_P(EveryDeformerTest, PosesMustFitTheHandlesAndBeFinite) {
+  const auto deformer = Create(testing::PrepareBar({}, 2).value());
+  std::vector<HandlePose> poses(1);
+  EXPECT_THAT(deformer->Deform(poses), StatusIs(kInvalid, HasSubstr("got 1 poses for 2 handles")));
+  poses.resize(2);
+  poses[1].translation_mm.x() = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(deformer->Deform(poses),
+              StatusIs(kInvalid, AllOf(HasSubstr("\"right\""), HasSubstr("translation"))));
+}
+
+TEST_P(IteratingDeformerTest, WarmStartIsFasterAndEndsInTheSamePlace) {
+  const auto preparation = testing::PrepareBar().value();
+  const auto warm = Create(preparation);
+  DeformControl control;
+  control.warm_start = true;
+  const HandlePose pose = Pose({0, 0.02, 0.32}, {1.02, 0, 1});
+  ASSERT_THAT(warm->Deform({Pose({0, 0, 0.3}, {1, 0, 1})}), IsOk());
+  ASSERT_OK_AND_ASSIGN(const Deformation started, warm->Deform({pose}, control));
+  ASSERT_OK_AND_ASSIGN(const Deformation cold, Create(preparation)->Deform({pose}));
+  EXPECT_TRUE(started.summary.converged);
+  EXPECT_LT(started.summary.iterations, cold.summary.iterations);
+  EXPECT_LT(DistanceOf(started.positions, cold.positions), 1e-4);
+  // Back at rest in one jump: the last answer does not trap it.
+  ASSERT_OK_AND_ASSIGN(const Deformation rest, warm->Deform({HandlePose{}}, control));
+  EXPECT_LT(DistanceOf(rest.positions, preparation->mesh().positions()), 1e-9);
+}
+
+TEST_P(IteratingDeformerTest, CallerSeesEveryAnswerAndMayStop) {
+  const auto preparation = testing::PrepareBar().value();
+  std::vector<int> seen;
+  DeformControl control;
+  control.on_progress = [&](const Deformation& so_far) {
+    EXPECT_EQ(so_far.positions.rows(), preparation->mesh().num_vertices());
+    seen.push_back(so_far.summary.iterations);
+    return seen.size() < 3;
+  };
+  ASSERT_OK_AND_ASSIGN(const Deformation answer,
+                       Create(preparation)->Deform({Pose({0, 0, 0.3}, {1, 0, 2})}, control));
+  EXPECT_EQ(seen, (std::vector<int>{seen[0], seen[0] + 1, seen[0] + 2}));
+  EXPECT_TRUE(answer.summary.cancelled);
+  EXPECT_FALSE(answer.summary.converged);
+  EXPECT_EQ(answer.summary.iterations, seen.back());
+}
+
+TEST_P(IteratingDeformerTest, RunningOutOfIterationsIsAResult) {
+  DeformerOptions options = GetParam().options;
+  options.gradient_field.max_iterations = 2;
+  options.arap.max_iterations = 2;
+  options.neo_hookean.max_iterations = 2;
+  ASSERT_OK_AND_ASSIGN(const auto deformer, CreateDeformer(testing::PrepareBar().value(), options));
+  ASSERT_OK_AND_ASSIGN(const Deformation answer, deformer->Deform({Pose({0, 0, 0.3}, {1, 0, 2})}));
+  EXPECT_FALSE(answer.summary.converged);
+  EXPECT_FALSE(answer.summary.cancelled);
+  EXPECT_EQ(answer.summary.iterations, 2);
+}
+
 DeformerOptions Options(DeformationModel model) {
   DeformerOptions options;
   options.model = model;
-  // Tighter than the default: the equilibrium itself is compared.
+  // Tighter than the defaults: the equilibrium itself is compared.
+  options.gradient_field.tolerance_mm = 1e-10;
+  options.gradient_field.max_iterations = 200;
+  options.arap.tolerance_mm = 1e-6;
+  options.arap.max_iterations = 300;
   options.neo_hookean.tolerance = 1e-6;
   return options;
 }
@@ -114,17 +188,19 @@ std::vector<Case> AllCases() {
   newton.neo_hookean.newton_after = 0;
   return {
       {"GradientField", Options(DeformationModel::kGradientField), 1e-10, std::nullopt},
-      {"EstimatedRotations", estimated, std::nullopt, std::nullopt},
-      {"Arap", Options(DeformationModel::kArap), 1e-10, std::nullopt},
+      {"EstimatedRotations", estimated, std::nullopt, std::nullopt, true},
+      {"Arap", Options(DeformationModel::kArap), 1e-10, std::nullopt, true},
       {"LinearElastic", Options(DeformationModel::kLinearElastic), std::nullopt, 1e-12},
-      {"NeoHookean", Options(DeformationModel::kNeoHookean), 1e-4, 1e-5},
-      {"NeoHookeanByNewton", newton, 1e-4, 1e-5},
+      {"NeoHookean", Options(DeformationModel::kNeoHookean), 1e-4, 1e-5, true},
+      {"NeoHookeanByNewton", newton, 1e-4, 1e-5, true},
   };
 }
 
-std::vector<Case> CasesWith(std::optional<double> Case::*tolerance) {
+// Those that promise it (have a tolerance for it).
+template <typename Promise>
+std::vector<Case> CasesWith(Promise Case::*promise) {
   std::vector<Case> cases = AllCases();
-  std::erase_if(cases, [tolerance](const Case& c) { return !(c.*tolerance).has_value(); });
+  std::erase_if(cases, [promise](const Case& c) { return !static_cast<bool>(c.*promise); });
   return cases;
 }
 
@@ -135,6 +211,9 @@ INSTANTIATE_TEST_SUITE_P(Models, RigidDeformerTest,
                          ::testing::ValuesIn(CasesWith(&Case::rigid_tolerance_mm)), NameOf);
 INSTANTIATE_TEST_SUITE_P(Models, ElasticDeformerTest,
                          ::testing::ValuesIn(CasesWith(&Case::affine_tolerance_mm)), NameOf);
+
+INSTANTIATE_TEST_SUITE_P(Models, IteratingDeformerTest,
+                         ::testing::ValuesIn(CasesWith(&Case::iterates)), NameOf);
 
 }  // namespace
 }  // namespace tissueform

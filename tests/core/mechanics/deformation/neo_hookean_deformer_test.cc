@@ -185,18 +185,6 @@ TEST(NeoHookeanDeformerTest, CallerMayStopAtEveryAnswer) {
   EXPECT_EQ(answer.summary.iterations, 3);
 }
 
-TEST(NeoHookeanDeformerTest, WarmStartEndsAtTheSameAnswer) {
-  const auto preparation = PrepareBar().value();
-  const auto warm = Create(preparation);
-  const HandlePose near = Pose({0, 0, 0.3}, {1, 0, 1});
-  const HandlePose pose = Pose({0, 0.05, 0.32}, {1.1, 0, 1});
-  ASSERT_THAT(warm->Deform({near}), IsOk());
-  const Deformation started = warm->Deform({pose}, {.warm_start = true, .on_progress = {}}).value();
-  const Deformation cold = Create(preparation)->Deform({pose}).value();
-  EXPECT_TRUE(started.summary.converged);
-  EXPECT_LT(LargestDifference(started.positions, cold.positions), 1e-4);
-}
-
 TEST(NeoHookeanDeformerTest, OptionsOutOfRangeAreRefused) {
   const auto preparation = PrepareBar().value();
   EXPECT_THAT(CreateNeoHookeanDeformer(preparation, {.max_iterations = 0}),
