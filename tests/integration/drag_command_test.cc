@@ -1,8 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +10,7 @@
 #include "gtest/gtest.h"
 
 #include "tests/integration/served_cli_test.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/test_paths.h"
 
@@ -37,8 +36,7 @@ class DragCommandTest : public ServedCliTest {
 
   // The bar's plan with changes of its text; returns its name.
   std::string Changed(const std::vector<std::pair<std::string, std::string>>& changes) const {
-    std::ifstream file(kBarFolder + "plan.json");
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    const std::string text = BytesOfFile(kBarFolder + "plan.json");
     std::string changed = absl::StrReplaceAll(text, changes);
     EXPECT_NE(changed, text);
     WriteBar();

@@ -6,8 +6,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,6 +25,7 @@
 #include "proto/conversion/mesh_conversion.h"
 #include "tests/integration/durable_server.h"
 #include "tests/integration/service_test.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
@@ -149,8 +148,7 @@ TEST_F(RestartTest, AnUploadGoesOnThroughKillAndRestart) {
   for (const absl::string_view segment : payload.segments) absl::StrAppend(&sent, segment);
   int found = 0;
   for (const auto& entry : std::filesystem::directory_iterator(server_.folder() / "blobs")) {
-    std::ifstream blob(entry.path(), std::ios::binary);
-    const std::string kept{std::istreambuf_iterator<char>(blob), {}};
+    const std::string kept = BytesOfFile(entry.path());
     found += kept.size() > sent.size() && kept.substr(kept.size() - sent.size()) == sent ? 1 : 0;
   }
   EXPECT_EQ(found, 1);

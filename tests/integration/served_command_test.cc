@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <signal.h>
 #include <string>
+#include <vector>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -31,6 +31,8 @@
 #include "core/planning/plan_io.h"
 #include "core/planning/rendering/virtual_display.h"
 #include "proto/conversion/mesh_conversion.h"
+#include "tests/integration/served_cli_test.h"
+#include "tests/testing/run_tissueform.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -67,24 +69,26 @@ double MeanMovement(const TetMeshFile& result, SkinRegion region) {
   return sum / count;
 }
 
-class ServedCommandTest : public ::testing::Test {
+// Commands of a server that runs already.
+class ServedCommandTest : public ServedCliTest {
  protected:
-  ServedCommandTest() { fs::create_directories(folder_); }
-  ~ServedCommandTest() override { fs::remove_all(folder_); }
-
-  std::string PathOf(const std::string& name) const { return (folder_ / name).string(); }
-
-  std::string Read(const std::string& name) const {
-    std::ifstream stream(PathOf(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
+  ProcessResult OfServer(std::vector<std::string> words) const {
+    words.insert(words.end(), {"--server", server_->address()});
+    return Run(words);
   }
 
+  const PlanProblem tongue_ = *ResolvePlan(*ReadPlan(kTonguePlan));
+};
+
+// `demo`, which starts a server of its own.
+class DemoCommandTest : public CliTest {
+ protected:
   // Its results go into the folder, what it says into out.txt there.
   int RunDemo(const std::string& options, const std::string& before = "") const {
     // Under AddressSanitizer: Mesa's leaks, see tests/core/planning/rendering/figure_test.cc.
     const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
     return ExitCodeOf(before + ProgramPath("tissueform") + " demo --no-browser --out " +
-                      folder_.string() + " " + options + " > " + PathOf("out.txt"));
+                      folder_.string() + " " + options + " > " + Path("out.txt"));
   }
 
   Json Summary() const { return Json::parse(Read("summary.json")); }
@@ -97,51 +101,35 @@ class ServedCommandTest : public ::testing::Test {
       EXPECT_THAT(Read("out.txt"), HasSubstr(name));
     }
   }
-
-  const fs::path folder_ = fs::path(::testing::TempDir()) /
-                           (std::string("tissueform_") +
-                            ::testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
 TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"),
-                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
-  const std::string program = ProgramPath("tissueform");
-  ASSERT_EQ(ExitCodeOf(program + " run " + kTonguePlan + " --server " + server->address() +
-                       " --out " + PathOf("run.vtu") + " --stats " + PathOf("run.json")),
-            0);
-  ASSERT_EQ(ExitCodeOf(program + " deform " + kTonguePlan + " --out " + PathOf("deform.vtu")), 0);
-  ASSERT_OK_AND_ASSIGN(const TetMeshFile run, ReadTetMesh(PathOf("run.vtu")));
-  ASSERT_OK_AND_ASSIGN(const TetMeshFile deform, ReadTetMesh(PathOf("deform.vtu")));
+  ASSERT_EQ(OfServer({"run", kTonguePlan, "--out", "run.vtu", "--stats", "run.json"}).exit_code, 0);
+  ASSERT_EQ(Run({"deform", kTonguePlan, "--out", "deform.vtu"}).exit_code, 0);
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile run, ReadTetMesh(Path("run.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile deform, ReadTetMesh(Path("deform.vtu")));
   ASSERT_EQ(run.mesh.num_vertices(), deform.mesh.num_vertices());
   // Coordinates are below 8 mm: float32 steps there are 4.8e-7 mm.
   EXPECT_LT((run.mesh.positions() - deform.mesh.positions()).cwiseAbs().maxCoeff(), 5e-7);
-  EXPECT_TRUE(fs::exists(PathOf("run.json")));
+  EXPECT_TRUE(fs::exists(Path("run.json")));
 }
 
 TEST_F(ServedCommandTest, RunTellsTheReactionsAndTheBandThatDeformTells) {
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"),
-                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
   std::ifstream bundled(SourcePath("tests/data/plans/bar/plan.json"));
   Json plan = Json::parse(bundled);
   plan["mesh"] = SourcePath("tests/data/plans/bar/bar.vtu");
   plan["model"] = "neo_hookean";
   plan["version"] = 2;
   plan["uncertainty"]["youngs_modulus_factor_95"] = 2;
-  std::ofstream(PathOf("plan.json")) << plan;
-  const auto stats = [&](const std::string& command, const std::string& name) {
-    const std::string words = ProgramPath("tissueform") + " " + command + " " +
-                              PathOf("plan.json") + " --allow-outside --out " +
-                              PathOf(name + ".vtu") + " --stats " + PathOf(name + ".json");
-    EXPECT_EQ(ExitCodeOf(words), 0);
-    return Json::parse(Read(name + ".json"));
+  Write("plan.json", plan.dump());
+  const std::vector<std::string> rest = {"plan.json", "--allow-outside", "--stats", "stats.json"};
+  const auto stats = [&](std::vector<std::string> words) {
+    words.insert(words.begin() + 1, rest.begin(), rest.end());
+    EXPECT_EQ(Run(words).exit_code, 0);
+    return Json::parse(Read("stats.json"));
   };
-  const Json of_run = stats("run --server " + server->address(), "run");
-  const Json of_deform = stats("deform", "deform");
+  const Json of_run = stats({"run", "--out", "run.vtu", "--server", server_->address()});
+  const Json of_deform = stats({"deform", "--out", "deform.vtu"});
   const Json& served = of_run.at("elastic");
   const Json& alone = of_deform.at("elastic");
   const auto force = [](const Json& of) {
@@ -152,7 +140,7 @@ TEST_F(ServedCommandTest, RunTellsTheReactionsAndTheBandThatDeformTells) {
   const double energy = alone["strain_energy_mj"];
   EXPECT_NEAR(served["strain_energy_mj"].get<double>(), energy, 1e-4 * energy);
   EXPECT_LT((force(served) - force(alone)).norm(), 1e-4 * force(alone).norm());
-  EXPECT_NE(FindAttribute(ReadTetMesh(PathOf("run.vtu"))->point_data, "reaction_force_n"), nullptr);
+  EXPECT_NE(FindAttribute(ReadTetMesh(Path("run.vtu"))->point_data, "reaction_force_n"), nullptr);
   const auto band = [](const Json& of) {
     return of.at("material_uncertainty")["places"][0]["max_mm"].get<double>();
   };
@@ -160,51 +148,34 @@ TEST_F(ServedCommandTest, RunTellsTheReactionsAndTheBandThatDeformTells) {
 }
 
 TEST_F(ServedCommandTest, RunWithoutServerFailsAndWritesNothing) {
-  EXPECT_EQ(ExitCodeOf(ProgramPath("tissueform") + " run " + kTonguePlan +
-                       " --server 127.0.0.1:1 --out " + PathOf("run.vtu") + " 2>" + PathOf("err")),
-            1);
-  EXPECT_FALSE(fs::exists(PathOf("run.vtu")));
+  EXPECT_EQ(Run({"run", kTonguePlan, "--server", "127.0.0.1:1", "--out", "run.vtu"}).exit_code, 1);
+  EXPECT_FALSE(fs::exists(Path("run.vtu")));
 }
 
 TEST_F(ServedCommandTest, MeshesAreUploadedListedAndDeleted) {
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"),
-                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
-  const auto mesh = [&](const std::string& words, const std::string& out) {
-    return ExitCodeOf(ProgramPath("tissueform") + " mesh " + words + " --server " +
-                      server->address() + " > " + PathOf(out) + " 2>&1");
-  };
-  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
-  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
-  TetMeshFile file{.mesh = *problem.mesh, .point_data = {}, .cell_data = {}};
+  TetMeshFile file{.mesh = *tongue_.mesh, .point_data = {}, .cell_data = {}};
   file.cell_data.push_back(
       {"density", 1, std::vector<double>(static_cast<size_t>(file.mesh.num_tets()), 2.0)});
-  ASSERT_THAT(WriteTetMesh(PathOf("mesh.vtu"), file), IsOk());
-  ASSERT_EQ(mesh("upload " + PathOf("mesh.vtu"), "upload"), 0) << Read("upload");
-  EXPECT_THAT(Read("upload"), HasSubstr("density"));
-  ASSERT_EQ(mesh("list", "list"), 0);
-  EXPECT_THAT(Read("list"), HasSubstr("1 meshes"));
-  const std::string said = Read("list");
-  const std::string name = said.substr(said.find("meshes/"), 71);
-  EXPECT_EQ(mesh("delete " + name, "delete"), 0) << Read("delete");
-  EXPECT_EQ(mesh("delete " + name, "again"), 1);
-  EXPECT_THAT(Read("again"), HasSubstr("does not have this mesh"));
-  EXPECT_NE(mesh("upload " + PathOf("none.vtu"), "none"), 0);
+  ASSERT_THAT(WriteTetMesh(Path("mesh.vtu"), file), IsOk());
+  const ProcessResult upload = OfServer({"mesh", "upload", "mesh.vtu"});
+  EXPECT_EQ(upload.exit_code, 0) << upload.err;
+  EXPECT_THAT(upload.out, HasSubstr("density"));
+  const ProcessResult list = OfServer({"mesh", "list"});
+  EXPECT_EQ(list.exit_code, 0) << list.err;
+  EXPECT_THAT(list.out, HasSubstr("1 meshes"));
+  const std::string name = list.out.substr(list.out.find("meshes/"), 71);
+  EXPECT_EQ(OfServer({"mesh", "delete", name}).exit_code, 0);
+  EXPECT_THAT(OfServer({"mesh", "delete", name}),
+              FailsWith(1, HasSubstr("does not have this mesh")));
+  EXPECT_NE(OfServer({"mesh", "upload", "none.vtu"}).exit_code, 0);
 }
 
 TEST_F(ServedCommandTest, AnUploadThatWasBrokenOffGoesOnAndSaysSo) {
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"),
-                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
-  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
-  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
-  const TetMeshFile file{.mesh = *problem.mesh, .point_data = {}, .cell_data = {}};
-  ASSERT_THAT(WriteTetMesh(PathOf("mesh.vtu"), file), IsOk());
+  const TetMeshFile file{.mesh = *tongue_.mesh, .point_data = {}, .cell_data = {}};
+  ASSERT_THAT(WriteTetMesh(Path("mesh.vtu"), file), IsOk());
   const MeshPayloadView payload = ViewMeshPayload(file.mesh.positions(), file.mesh.tets(), {});
   const auto stub = v1::MeshService::NewStub(
-      grpc::CreateChannel(server->address(), grpc::InsecureChannelCredentials()));
+      grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
   grpc::ClientContext context;
   v1::UploadMeshResponse response;
   const auto writer = stub->UploadMesh(&context, &response);
@@ -215,74 +186,52 @@ TEST_F(ServedCommandTest, AnUploadThatWasBrokenOffGoesOnAndSaysSo) {
   writer->Write(request);
   writer->WritesDone();
   ASSERT_EQ(writer->Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(
-      ExitCodeOf(ProgramPath("tissueform") + " mesh upload " + PathOf("mesh.vtu") + " --server " +
-                 server->address() + " > " + PathOf("upload") + " 2> " + PathOf("lines")),
-      0);
-  EXPECT_THAT(Read("lines"),
+  const ProcessResult upload = OfServer({"mesh", "upload", "mesh.vtu"});
+  EXPECT_EQ(upload.exit_code, 0);
+  EXPECT_THAT(upload.err,
               ContainsRegex("the upload continues: the server has 0.0 of [0-9.]+ MB already"));
-  EXPECT_THAT(Read("upload"), HasSubstr(payload.Sha256()));
+  EXPECT_THAT(upload.out, HasSubstr(payload.Sha256()));
 }
 
 TEST_F(ServedCommandTest, UploadWarnsOfAMeshThatIsProbablyNotInMillimeters) {
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"),
-                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
-  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
-  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
   for (const double size_mm : {100.0, 0.1}) {
-    const double scale = size_mm / problem.mesh->BoundingBoxDiagonal();
+    const double scale = size_mm / tongue_.mesh->BoundingBoxDiagonal();
     const TetMeshFile file{
-        .mesh = *TetMesh::Create(problem.mesh->positions() * scale, problem.mesh->tets()),
+        .mesh = *TetMesh::Create(tongue_.mesh->positions() * scale, tongue_.mesh->tets()),
         .point_data = {},
         .cell_data = {}};
-    ASSERT_THAT(WriteTetMesh(PathOf("mesh.vtu"), file), IsOk());
-    EXPECT_EQ(
-        ExitCodeOf(ProgramPath("tissueform") + " mesh upload " + PathOf("mesh.vtu") + " --server " +
-                   server->address() + " > " + PathOf("upload") + " 2> " + PathOf("lines")),
-        0);
-    EXPECT_EQ(absl::StrContains(Read("lines"), "mesh.vtu: the diagonal of the bounding box is"),
+    ASSERT_THAT(WriteTetMesh(Path("mesh.vtu"), file), IsOk());
+    const ProcessResult upload = OfServer({"mesh", "upload", "mesh.vtu"});
+    EXPECT_EQ(upload.exit_code, 0);
+    EXPECT_EQ(absl::StrContains(upload.err, "mesh.vtu: the diagonal of the bounding box is"),
               size_mm < 1);
   }
 }
 
 TEST_F(ServedCommandTest, WatchTellsOfASessionThatNobodyDrags) {
-  ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> server,
-      ServerProcess::Start(ProgramPath("tissueform-server"),
-                           {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
-  const std::string watch = ProgramPath("tissueform") + " watch --server " + server->address();
-  EXPECT_EQ(ExitCodeOf(watch + " 0123456789abcdef 2> " + PathOf("err")), 1);
-  EXPECT_THAT(Read("err"), HasSubstr("no session"));
-  ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
-  ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ResolvePlan(plan));
-  ASSERT_OK_AND_ASSIGN(const auto client, TissueformClient::Connect(server->address(), {}));
-  ASSERT_OK_AND_ASSIGN(const auto session, PlanSession::Create(client.get(), problem));
-  ASSERT_EQ(ExitCodeOf(watch + " " + session->name() + " --seconds 1 > " + PathOf("out")), 0);
-  EXPECT_THAT(Read("out"), ContainsRegex("1 frames/s, age .* no drag: at rest\n"));
+  EXPECT_THAT(OfServer({"watch", "0123456789abcdef"}), FailsWith(1, HasSubstr("no session")));
+  ASSERT_OK_AND_ASSIGN(const auto client, TissueformClient::Connect(server_->address(), {}));
+  ASSERT_OK_AND_ASSIGN(const auto session, PlanSession::Create(client.get(), tongue_));
+  const ProcessResult watch = OfServer({"watch", session->name(), "--seconds", "1"});
+  EXPECT_EQ(watch.exit_code, 0) << watch.err;
+  EXPECT_THAT(watch.out, ContainsRegex("1 frames/s, age .* no drag: at rest\n"));
 }
 
 TEST_F(ServedCommandTest, ServerInfoAsTableAndAsJson) {
-  ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ServerProcess> server,
-                       ServerProcess::Start(ProgramPath("tissueform-server"),
-                                            {"--in-memory", "--port", "0", "--log-level", "warn",
-                                             "--max-sessions", "17"},
-                                            kPatience));
-  const std::string command =
-      ProgramPath("tissueform") + " server-info --server " + server->address();
-  ASSERT_EQ(ExitCodeOf(command + " > " + PathOf("table.txt")), 0);
-  EXPECT_THAT(Read("table.txt"),
+  ASSERT_OK_AND_ASSIGN(server_, ServerProcess::Start(ProgramPath("tissueform-server"),
+                                                     {"--in-memory", "--port", "0", "--log-level",
+                                                      "warn", "--max-sessions", "17"},
+                                                     kPatience));
+  EXPECT_THAT(OfServer({"server-info"}).out,
               AllOf(ContainsRegex("protocol +tissueform.v1"), ContainsRegex("max_sessions +17\n"),
                     ContainsRegex("neo_hookean +yes +yes\n"), ContainsRegex("arap +yes +no\n")));
-  ASSERT_EQ(ExitCodeOf(command + " --json > " + PathOf("info.json")), 0);
-  const Json info = Json::parse(Read("info.json"));
+  const Json info = Json::parse(OfServer({"server-info", "--json"}).out);
   EXPECT_EQ(info["limits"]["max_sessions"], 17);
   EXPECT_EQ(info["draining"], false);
   EXPECT_EQ(info["models"].size(), 4);
 }
 
-TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures) {
+TEST_F(DemoCommandTest, TellsHowTheFaceFollowsAndLeavesResultsAndPictures) {
   ASSERT_EQ(RunDemo("--plan " + kChinPlan + " --seconds 0.5"), 0);
   EXPECT_THAT(
       Read("out.txt"),
@@ -291,10 +240,10 @@ TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures)
             ContainsRegex("\nnose +[0-9.]+"), HasSubstr("gradient_field and linear_elastic"),
             HasSubstr("\nface "), HasSubstr("not a medical device")));
   ExpectPictures();
-  ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(PathOf("result.vtu")));
-  ASSERT_OK_AND_ASSIGN(const TriangleMeshFile skin, ReadTriangleMesh(PathOf("skin.stl")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("result.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TriangleMeshFile skin, ReadTriangleMesh(Path("skin.stl")));
   EXPECT_EQ(skin.mesh.num_triangles(), BoundaryFacets(result.mesh).rows());
-  EXPECT_GT(fs::file_size(PathOf("frames.csv")), 1000);
+  EXPECT_GT(fs::file_size(Path("frames.csv")), 1000);
 
   const Json summary = Summary();
   EXPECT_EQ(summary["frames_sent"], 30);
@@ -316,17 +265,15 @@ TEST_F(ServedCommandTest, DemoTellsHowTheFaceFollowsAndLeavesResultsAndPictures)
   EXPECT_LT(summary["movement"]["nose"]["foremost"]["total_mm"], 0.1);
 }
 
-TEST_F(ServedCommandTest, DemoComparesWithTheElasticModelAsInProcess) {
+TEST_F(DemoCommandTest, ComparesWithTheElasticModelAsInProcess) {
   ASSERT_EQ(RunDemo("--plan " + kTonguePlan + " --seconds 0.1 --encoding int16"), 0);
   EXPECT_GT(Summary()["end_error_mm"], 0);
   EXPECT_LT(Summary()["end_error_mm"], 0.0105);  // of prepared answers, and half of a step
-  const std::string program = ProgramPath("tissueform");
-  const std::string elastic = PathOf("elastic.vtu");
-  ASSERT_EQ(ExitCodeOf(program + " deform " + kTonguePlan + " --model linear_elastic --out " +
-                       elastic + " 2>" + PathOf("err")),
-            0);
-  ASSERT_OK_AND_ASSIGN(const TetMeshFile ours, ReadTetMesh(PathOf("result.vtu")));
-  ASSERT_OK_AND_ASSIGN(const TetMeshFile other, ReadTetMesh(elastic));
+  ASSERT_EQ(
+      Run({"deform", kTonguePlan, "--model", "linear_elastic", "--out", "elastic.vtu"}).exit_code,
+      0);
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile ours, ReadTetMesh(Path("result.vtu")));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile other, ReadTetMesh(Path("elastic.vtu")));
   const Json difference = Summary()["difference"];
   EXPECT_EQ(difference["model"], "linear_elastic");
   // The largest difference is on the skin here; float32 steps at 8 mm are 4.8e-7 mm.
@@ -346,12 +293,12 @@ TEST_F(ServedCommandTest, DemoComparesWithTheElasticModelAsInProcess) {
   ExpectPictures();
 }
 
-TEST_F(ServedCommandTest, DemoMovesTheJawOfTheBundledHeadBy8MmAlsoWithoutADisplay) {
+TEST_F(DemoCommandTest, MovesTheJawOfTheBundledHeadBy8MmAlsoWithoutADisplay) {
   ASSERT_EQ(RunDemo("--seconds 0.3", "env -u DISPLAY PATH=/nonexistent "), 0);
   EXPECT_THAT(Read("out.txt"),
               AllOf(HasSubstr("plans/head/plan.json"), HasSubstr("mandible 8 mm forward"),
                     ContainsRegex("\nno pictures: [^\n]*xvfb[^\n]*\n")));
-  EXPECT_FALSE(fs::exists(PathOf("front.png")));
+  EXPECT_FALSE(fs::exists(Path("front.png")));
   const Json summary = Summary();
   EXPECT_EQ(summary["inverted_tets"], 0);
   const Json& chin = summary["movement"]["chin"]["mean"];
@@ -360,10 +307,10 @@ TEST_F(ServedCommandTest, DemoMovesTheJawOfTheBundledHeadBy8MmAlsoWithoutADispla
   EXPECT_LT(summary["movement"]["nose"]["foremost"]["total_mm"], 1);
 }
 
-TEST_F(ServedCommandTest, DemoServesWhatItPredictedUntilItIsInterrupted) {
+TEST_F(DemoCommandTest, ServesWhatItPredictedUntilItIsInterrupted) {
   const std::string command = "echo $$; exec env -u DISPLAY PATH=/nonexistent " +
                               ProgramPath("tissueform") + " demo --serve --seconds 0.1 --plan " +
-                              kTonguePlan + " --out " + folder_.string() + " 2>" + PathOf("err");
+                              kTonguePlan + " --out " + folder_.string() + " 2>" + Path("err");
   FILE* demo = popen(command.c_str(), "r");
   ASSERT_NE(demo, nullptr);
   std::array<char, 512> line{};
@@ -390,14 +337,14 @@ TEST_F(ServedCommandTest, DemoServesWhatItPredictedUntilItIsInterrupted) {
   EXPECT_EQ(WEXITSTATUS(pclose(demo)), 0);
 }
 
-TEST_F(ServedCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork) {
+TEST_F(DemoCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork) {
   ASSERT_OK_AND_ASSIGN(
-      const std::unique_ptr<ServerProcess> other,
+      const auto other,
       ServerProcess::Start(ProgramPath("tissueform-server"),
                            {"--in-memory", "--port", "0", "--log-level", "warn"}, kPatience));
   const std::string port = other->address().substr(other->address().rfind(':') + 1);
   for (const std::string option : {"--port", "--serve --web-port"}) {
-    EXPECT_EQ(RunDemo(absl::StrCat(option, " ", port, " 2>", PathOf("err"))), 1);
+    EXPECT_EQ(RunDemo(absl::StrCat(option, " ", port, " 2>", Path("err"))), 1);
     EXPECT_EQ(Read("out.txt"), "");
     EXPECT_EQ(Read("err"),
               absl::StrCat("tissueform: ", option.substr(option.rfind("--")), " ", port,
@@ -406,7 +353,7 @@ TEST_F(ServedCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork)
   }
 }
 
-TEST_F(ServedCommandTest, AProgramThatEndsBeforeItListensIsNamed) {
+TEST(ServerProcessTest, AProgramThatEndsBeforeItListensIsNamed) {
   for (const char* program : {"tissueform-server", "tissueform-gateway"}) {
     EXPECT_THAT(
         ServerProcess::Start(ProgramPath(program), {"--no-such-option"}, kPatience).status(),
@@ -415,10 +362,10 @@ TEST_F(ServedCommandTest, AProgramThatEndsBeforeItListensIsNamed) {
   }
 }
 
-TEST_F(ServedCommandTest, AnInterruptedDemoEndsItsServer) {
+TEST_F(DemoCommandTest, AnInterruptedDemoEndsItsServer) {
   // The shell tells its process number and becomes the demo.
   const std::string command = "echo $$; exec " + ProgramPath("tissueform") + " demo --out " +
-                              folder_.string() + " 2>" + PathOf("err");
+                              folder_.string() + " 2>" + Path("err");
   FILE* demo = popen(command.c_str(), "r");
   ASSERT_NE(demo, nullptr);
   std::array<char, 512> line{};

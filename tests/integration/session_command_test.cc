@@ -1,8 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +15,7 @@
 #include "core/mechanics/deformation/deformer.h"
 #include "core/planning/plan_io.h"
 #include "tests/integration/served_cli_test.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -39,7 +38,7 @@ class SessionCommandTest : public ServedCliTest {
     ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(kTonguePlan));
     ASSERT_OK_AND_ASSIGN(problem_, ResolvePlan(plan));
     ASSERT_OK_AND_ASSIGN(session_, PlanSession::Create(client_.get(), *problem_));
-    const std::string text = ReadText(kTonguePlan);
+    const std::string text = BytesOfFile(kTonguePlan);
     Write("regions.json",
           absl::StrReplaceAll(
               text, {{"\"volumetricTongue.vtu\"",
@@ -54,10 +53,6 @@ class SessionCommandTest : public ServedCliTest {
     CliTest::TearDown();
   }
 
-  static std::string ReadText(const std::string& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
   ProcessResult Update(std::vector<std::string> words) const {
     words.insert(words.begin(), {"session", "update", session_->name()});
     words.insert(words.end(), {"--server", server_->address()});

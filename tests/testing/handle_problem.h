@@ -25,6 +25,12 @@ class RandomNumbers {
   std::mt19937 generator_;
 };
 
+// Of two positions of one vertex.
+template <typename Given, typename Expected>
+double LargestDistance(const Given& given, const Expected& expected) {
+  return (given.template cast<double>() - expected).rowwise().norm().maxCoeff();
+}
+
 // Stiffness between 3 and 53 kPa.
 inline Eigen::VectorXd MixedStiffness(Eigen::Index num_tets) {
   RandomNumbers random(3);

@@ -7,7 +7,6 @@
 #include <csignal>
 #include <fcntl.h>
 #include <fstream>
-#include <iterator>
 #include <regex>
 #include <sstream>
 #include <unistd.h>
@@ -15,16 +14,12 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/test_paths.h"
 
 namespace tissueform::testing {
 namespace {
-
-std::string Slurp(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 // Without the lines of StageTimes, and those of StageProgress, which come when a machine is slow
 // and not otherwise.
@@ -72,8 +67,8 @@ ProcessResult RunTissueform(const std::vector<std::string>& arguments,
   }
   int status = 0;
   waitpid(child, &status, 0);
-  ProcessResult result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, Slurp(out),
-                       WithoutProgress(Slurp(err))};
+  ProcessResult result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, BytesOfFile(out),
+                       WithoutProgress(BytesOfFile(err))};
   std::filesystem::remove(out);
   std::filesystem::remove(err);
   return result;
@@ -93,7 +88,7 @@ void CliTest::Write(const std::string& name, const std::string& contents) const 
   std::ofstream(folder_ / name, std::ios::binary) << contents;
 }
 
-std::string CliTest::Read(const std::string& name) const { return Slurp(folder_ / name); }
+std::string CliTest::Read(const std::string& name) const { return BytesOfFile(folder_ / name); }
 
 std::vector<std::string> CliTest::Files() const {
   std::vector<std::string> names;

@@ -5,13 +5,13 @@
 
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/test_paths.h"
 
 namespace tissueform::testing {
@@ -57,10 +57,7 @@ MovingData SmallData() {
   return data;
 }
 
-std::string ReadGolden() {
-  std::ifstream file(SourcePath("tests/data/moving_file/small.bin"), std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string ReadGolden() { return BytesOfFile(SourcePath("tests/data/moving_file/small.bin")); }
 
 TEST(MovingDataTest, TheBytesAreThoseThatThePlannerReads) {
   const std::string bytes = WriteMovingData(SmallData());

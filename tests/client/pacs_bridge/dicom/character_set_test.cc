@@ -22,13 +22,10 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
-using testing::CtSeriesOptions;
-using testing::EmptyTestFolder;
 using ::testing::Optional;
-using testing::WriteCtSeries;
 
 // Of PatientName, in a file with that SpecificCharacterSet.
 struct Sample {
@@ -151,7 +148,7 @@ TEST_P(CharacterSetTest, NamesComeAsUtf8) {
   options.patient_name = GetParam().raw;
   const auto series = WriteCtSeries(EmptyTestFolder("character_set_" + GetParam().called), options);
   const auto header = ReadInstanceHeader(series.files[0]);
-  ASSERT_THAT(header.status(), testing::IsOk());
+  ASSERT_THAT(header.status(), IsOk());
   EXPECT_EQ(header->patient_name, GetParam().utf8);
   EXPECT_EQ(header->text_problem, "");
 }
@@ -242,4 +239,4 @@ TEST(CharacterSetsTest, WhatIsOfNoNamedSetIsNotGuessed) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

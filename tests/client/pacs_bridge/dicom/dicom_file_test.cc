@@ -5,8 +5,6 @@
 
 #include <csignal>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <string>
 
@@ -20,26 +18,15 @@
 #include "client/pacs_bridge/dicom/patient_study.h"
 #include "core/base/error_reason.h"
 #include "tests/testing/ct_series.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::CtSeries;
-using testing::CtSeriesOptions;
-using testing::EmptyTestFolder;
 using ::testing::HasSubstr;
-using testing::IsOk;
-using testing::StatusIs;
-using testing::WriteCtSeries;
-using testing::WriteTestFile;
-
-std::string BytesOf(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 CtSeries OneSlice(const fs::path& folder, CtSeriesOptions options = {}) {
   options.slices = 1;
@@ -132,7 +119,7 @@ TEST(DicomFile, WhatIsNoDicomFileIsRefused) {
   EXPECT_THAT(LoadDicomHeader(folder / "text").status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a DICOM file")));
   const CtSeries series = OneSlice(folder);
-  WriteTestFile(folder / "cut", BytesOf(series.files[0]).substr(0, 700));
+  WriteTestFile(folder / "cut", BytesOfFile(series.files[0]).substr(0, 700));
   EXPECT_THAT(LoadDicomHeader(folder / "cut").status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("damaged, truncated")));
   EXPECT_THAT(
@@ -142,7 +129,7 @@ TEST(DicomFile, WhatIsNoDicomFileIsRefused) {
 
 TEST(DicomFile, ItemsWithinItemsEndAtALimitAndNotWithTheStack) {
   const fs::path folder = EmptyTestFolder("dicom_nested");
-  const std::string good = BytesOf(OneSlice(folder).files[0]);
+  const std::string good = BytesOfFile(OneSlice(folder).files[0]);
   // A sequence with an item with a sequence: (0008,1140) of undefined length.
   const std::string open(
       "\x08\x00\x40\x11SQ\x00\x00\xFF\xFF\xFF\xFF\xFE\xFF\x00\xE0\xFF\xFF\xFF\xFF", 20);
@@ -171,4 +158,4 @@ TEST(DicomFile, WhatIsDeflatedIsRefused) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

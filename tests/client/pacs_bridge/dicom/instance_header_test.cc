@@ -16,17 +16,11 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
-using testing::CtSeries;
-using testing::CtSeriesOptions;
-using testing::EmptyTestFolder;
 using ::testing::HasSubstr;
-using testing::IsOk;
 using ::testing::Not;
-using testing::StatusIs;
-using testing::WriteCtSeries;
 
 InstanceHeader HeaderOf(const std::string& name, const CtSeriesOptions& options) {
   const CtSeries series = WriteCtSeries(EmptyTestFolder("header_" + name), options);
@@ -108,4 +102,4 @@ TEST(InstanceHeader, AUidThatIsNoneIsRefusedWithoutRepeatingIt) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

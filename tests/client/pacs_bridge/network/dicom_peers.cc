@@ -7,8 +7,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <thread>
 #include <unistd.h>
@@ -121,11 +119,6 @@ std::vector<EndedAssociation> RecordingSink::WaitForEnds(size_t count) const {
   MutexLock lock(mutex_);
   while (ends_.size() < count && changed_.WaitUntil(mutex_, until)) continue;
   return ends_;
-}
-
-std::string BytesOfFile(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 std::string DataSetOfFile(const fs::path& path) {

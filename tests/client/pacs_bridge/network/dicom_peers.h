@@ -12,6 +12,7 @@
 #include "client/pacs_bridge/network/instance_sink.h"
 #include "core/base/mutex.h"
 #include "core/base/process/guarded_program.h"
+#include "tests/testing/file_bytes.h"
 
 // DICOM programs that nobody here wrote, and a sink that keeps account.
 namespace tissueform::testing {
@@ -53,7 +54,6 @@ class RecordingSink : public InstanceSink {
   std::vector<EndedAssociation> ends_ ABSL_GUARDED_BY(mutex_);
 };
 
-std::string BytesOfFile(const std::filesystem::path& path);
 // The bytes of a PS3.10 file after its meta header.
 std::string DataSetOfFile(const std::filesystem::path& path);
 

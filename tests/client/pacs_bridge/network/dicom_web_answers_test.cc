@@ -12,12 +12,10 @@
 
 #include "tests/testing/status_matchers.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 using ::testing::HasSubstr;
-using testing::IsOk;
-using testing::StatusIs;
 
 constexpr char kUid[] = "2.25.4711";
 
@@ -87,4 +85,4 @@ TEST(StatusOfStow, ComesAgainWhereNothingIsSaidOfTheObject) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

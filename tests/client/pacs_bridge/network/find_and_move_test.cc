@@ -18,13 +18,11 @@
 #include "tests/testing/test_authority.h"
 
 // A PACS that does not offer everything.
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
-using testing::IsOk;
-using testing::StatusIs;
 
 PacsPeer PeerAt(int port, const std::string& title) {
   PacsPeer peer;
@@ -39,10 +37,10 @@ PacsPeer PeerAt(int port, const std::string& title) {
 class FindAndMoveTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!testing::HasProgram("dcmqrscp")) GTEST_SKIP() << "dcmqrscp is absent: install dcmtk";
+    if (!HasProgram("dcmqrscp")) GTEST_SKIP() << "dcmqrscp is absent: install dcmtk";
     fs::create_directories(home_ / "area");
-    const int port = testing::FreePort();
-    testing::WriteTestFile(
+    const int port = FreePort();
+    WriteTestFile(
         home_ / "config",
         absl::StrCat("NetworkTCPPort = ", port,
                      "\nMaxPDUSize = 16384\nMaxAssociations = 16\nHostTable BEGIN\nHostTable END\n"
@@ -56,22 +54,22 @@ class FindAndMoveTest : public ::testing::Test {
     auto started = GuardedProgram::Start(options, std::chrono::milliseconds(200));
     ASSERT_THAT(started.status(), IsOk());
     archive_ = *std::move(started);
-    ASSERT_TRUE(testing::WaitForPort(port)) << testing::BytesOfFile(home_ / "log");
+    ASSERT_TRUE(WaitForPort(port)) << BytesOfFile(home_ / "log");
     client_ = *MakePacsClient(PeerAt(port, "ARCHIVE"));
   }
 
-  const fs::path home_ = testing::EmptyTestFolder("find_and_move");
+  const fs::path home_ = EmptyTestFolder("find_and_move");
   std::unique_ptr<GuardedProgram> archive_;
   std::unique_ptr<PacsClient> client_;
 };
 
 TEST_F(FindAndMoveTest, AStudysPatientIsFoundAlthoughNoHeaderComes) {
   fs::create_directories(home_ / "sent");
-  testing::CtSeriesOptions options;
+  CtSeriesOptions options;
   options.slices = 1;
   options.character_set = "ISO_IR 100";
   options.patient_name = "M\xFCller^Maria";
-  const testing::CtSeries series = testing::WriteCtSeries(home_ / "sent", options);
+  const CtSeries series = WriteCtSeries(home_ / "sent", options);
   const auto stored = client_->Store(series.files);
   ASSERT_THAT(stored.status(), IsOk());
   ASSERT_THAT(stored->at(0).status, IsOk());
@@ -88,4 +86,4 @@ TEST_F(FindAndMoveTest, AStudysPatientIsFoundAlthoughNoHeaderComes) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -16,19 +16,12 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::CtSeries;
-using testing::EmptyTestFolder;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::IsOk;
-using testing::RecordingSink;
-using testing::StatusIs;
-using testing::WriteCtSeries;
-using testing::WriteTestFile;
 
 class InstanceFolderTest : public ::testing::Test {
  protected:
@@ -55,7 +48,7 @@ class InstanceFolderTest : public ::testing::Test {
 };
 
 TEST_F(InstanceFolderTest, WhatIsNotAsAnnouncedIsRefusedAndGone) {
-  const std::string bytes = testing::BytesOfFile(series_.files[0]);
+  const std::string bytes = BytesOfFile(series_.files[0]);
   EXPECT_THAT(Take(bytes, {.instance_uid = "1.2.3"}).status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("another object or class")));
   EXPECT_THAT(Take(bytes, {.class_uid = "1.2.3"}).status(),
@@ -67,7 +60,7 @@ TEST_F(InstanceFolderTest, WhatIsNotAsAnnouncedIsRefusedAndGone) {
 }
 
 TEST_F(InstanceFolderTest, WhatACrashLeftHalfWrittenGoesWhenItIsOpened) {
-  EXPECT_THAT(Take(testing::BytesOfFile(series_.files[0]), {}).status(), IsOk());
+  EXPECT_THAT(Take(BytesOfFile(series_.files[0]), {}).status(), IsOk());
   WriteTestFile(path_ / "2.25.1.partial", "half");
   const auto again = InstanceFolder::Open({.path = path_, .watermark_bytes = 0});
   ASSERT_THAT(again.status(), IsOk());
@@ -76,7 +69,7 @@ TEST_F(InstanceFolderTest, WhatACrashLeftHalfWrittenGoesWhenItIsOpened) {
 }
 
 TEST_F(InstanceFolderTest, AnObjectIsKnownAgainAfterARestart) {
-  const std::string bytes = testing::BytesOfFile(series_.files[0]);
+  const std::string bytes = BytesOfFile(series_.files[0]);
   const auto first = Take(bytes, {});
   ASSERT_THAT(first.status(), IsOk());
   folder_ = *InstanceFolder::Open({.path = path_, .watermark_bytes = 0});
@@ -92,4 +85,4 @@ TEST_F(InstanceFolderTest, AFolderThatIsNotThereIsTold) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

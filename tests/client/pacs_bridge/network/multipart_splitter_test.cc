@@ -12,13 +12,11 @@
 
 #include "tests/testing/status_matchers.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using testing::IsOk;
-using testing::StatusIs;
 
 constexpr char kType[] = "multipart/related; type=\"application/dicom\"; boundary=\"cut here\"";
 
@@ -91,4 +89,4 @@ TEST(MultipartSplitter, OtherTypesAndBoundariesAreRefused) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -27,29 +27,13 @@
 #include "tests/testing/test_authority.h"
 #include "tests/testing/test_paths.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::BytesOfFile;
-using testing::CtSeries;
-using testing::CtSeriesOptions;
-using testing::DataSetOfFile;
-using testing::EmptyTestFolder;
-using testing::FreePort;
-using testing::HasProgram;
 using ::testing::HasSubstr;
-using testing::IsOk;
 using ::testing::Not;
-using testing::RecordingSink;
 using ::testing::SizeIs;
-using testing::SourcePath;
-using testing::StatusIs;
-using testing::TestAuthority;
-using testing::TestFiles;
-using testing::WaitForPort;
-using testing::WriteCtSeries;
-using testing::WriteTestFile;
 
 constexpr char kDicomWebPlugin[] = "/usr/share/orthanc/plugins/libOrthancDicomWeb.so";
 
@@ -448,4 +432,4 @@ TEST(PacsClient, PeersThatCannotBeAreTold) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

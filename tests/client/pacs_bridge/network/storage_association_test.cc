@@ -21,20 +21,11 @@
 #include "tests/testing/test_authority.h"
 
 // What DCMTK's and GDCM's programs send, whole and broken off.
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::CtSeries;
-using testing::CutWire;
-using testing::DataSetOfFile;
-using testing::HasProgram;
-using testing::IsOk;
-using testing::ProgramEnd;
-using testing::RecordingSink;
-using testing::RunPeer;
 using ::testing::SizeIs;
-using testing::WireEnd;
 
 constexpr char kJpeg2000Lossless[] = "1.2.840.10008.1.2.4.90";
 
@@ -44,8 +35,8 @@ class StorageAssociationTest : public ::testing::Test {
     if (!HasProgram("storescu")) GTEST_SKIP() << "storescu is absent: install dcmtk";
     std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
     for (char& c : name) c = c == '/' ? '_' : c;
-    sent_ = testing::EmptyTestFolder(absl::StrCat("associated_", name));
-    received_ = testing::EmptyTestFolder(absl::StrCat("association_", name));
+    sent_ = EmptyTestFolder(absl::StrCat("associated_", name));
+    received_ = EmptyTestFolder(absl::StrCat("association_", name));
     folder_ = *InstanceFolder::Open({.path = received_, .watermark_bytes = 0});
     ReceiverOptions options;
     options.calling_ae_titles = {"SCANNER"};
@@ -76,7 +67,7 @@ class StorageAssociationTest : public ::testing::Test {
 
 TEST_F(StorageAssociationTest, Jpeg2000IsKeptAsItIs) {
   if (!HasProgram("gdcmconv")) GTEST_SKIP() << "gdcmconv is absent: install libgdcm-tools";
-  const CtSeries series = testing::WriteCtSeries(sent_, {.slices = 2});
+  const CtSeries series = WriteCtSeries(sent_, {.slices = 2});
   std::vector<std::string> compressed;
   for (const std::string& file : series.files) {
     compressed.push_back(absl::StrCat(file, ".j2k"));
@@ -97,11 +88,11 @@ class BrokenTransferTest : public StorageAssociationTest,
                            public ::testing::WithParamInterface<WireEnd> {};
 
 TEST_P(BrokenTransferTest, LeavesWhatCameBeforeAndNothingHalf) {
-  testing::CtSeriesOptions large;
+  CtSeriesOptions large;
   large.slices = 3;
   large.rows = 512;
   large.columns = 512;
-  const CtSeries series = testing::WriteCtSeries(sent_, large);
+  const CtSeries series = WriteCtSeries(sent_, large);
   const auto one = static_cast<int64_t>(fs::file_size(series.files[0]));
   {
     const CutWire wire(receiver_->port(), one + one / 2, GetParam());
@@ -126,4 +117,4 @@ INSTANTIATE_TEST_SUITE_P(Ends, BrokenTransferTest,
                          });
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -32,26 +32,14 @@
 #include "tests/testing/test_authority.h"
 #include "tests/testing/test_paths.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::BytesOfFile;
-using testing::CtSeries;
-using testing::CtSeriesOptions;
-using testing::DataSetOfFile;
-using testing::EmptyTestFolder;
-using testing::HasProgram;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::IsOk;
 using ::testing::Not;
-using testing::ProgramEnd;
-using testing::RecordingSink;
-using testing::RunPeer;
 using ::testing::SizeIs;
-using testing::StatusIs;
-using testing::WriteCtSeries;
 
 // A receiver on a free port, its folder and its sink; and storescu of DCMTK.
 class StorageReceiverTest : public ::testing::Test {
@@ -105,7 +93,7 @@ TEST_F(StorageReceiverTest, AnObjectThatIsTooLargeIsNotToBeSentAgain) {
 }
 
 TEST(ConformanceStatement, NamesEveryStorageClassThatIsTaken) {
-  const std::string statement = BytesOfFile(testing::SourcePath("docs/dicom-storage-classes.csv"));
+  const std::string statement = BytesOfFile(SourcePath("docs/dicom-storage-classes.csv"));
   for (int i = 0; i < numberOfDcmAllStorageSOPClassUIDs; ++i) {
     const std::string uid = dcmAllStorageSOPClassUIDs[i];
     EXPECT_THAT(statement,
@@ -371,4 +359,4 @@ TEST(StorageReceiver, OptionsThatCannotBeAreTold) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -19,23 +19,13 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::EmptyTestFolder;
-using testing::HasProgram;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::IsOk;
-using testing::ProgramEnd;
-using testing::RecordingSink;
-using testing::RunPeer;
 using ::testing::SizeIs;
-using testing::StatusIs;
-using testing::TestAuthority;
-using testing::TestFiles;
-using testing::WriteCtSeries;
 
 TlsFiles FilesOf(const TestFiles& files) { return {files.certificate, files.key, files.roots}; }
 
@@ -124,4 +114,4 @@ TEST(TlsLayer, FilesThatDoNotFitAreNamed) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

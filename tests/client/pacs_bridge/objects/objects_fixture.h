@@ -5,8 +5,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <png.h>
@@ -26,6 +24,7 @@
 #include "proto/conversion/geometry_conversion.h"
 #include "tests/core/planning/case_file/sample_case.h"
 #include "tests/testing/ct_series.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
@@ -133,18 +132,13 @@ class ObjectsFixture : public ::testing::Test {
     return value.c_str();
   }
 
-  static std::string Bytes(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-
   // Another's program, whose words go to said.txt.
   int Run(const std::string& command) const {
     const int status =
         std::system(absl::StrCat(command, " > ", (folder_ / "said.txt").string(), " 2>&1").c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
-  std::string Said() const { return Bytes(folder_ / "said.txt"); }
+  std::string Said() const { return BytesOfFile(folder_ / "said.txt"); }
   bool Has(const std::string& program) const {
     return Run(absl::StrCat("command -v ", program)) == 0;
   }

@@ -131,7 +131,7 @@ TEST_F(OtherReadersTest, Dcm2pnmShowsThePicturesPixels) {
       ASSERT_EQ(Run(absl::StrCat(program, " +op +F ", frame + 1, " ", capture, " ", ppm)), 0)
           << Said();
       const std::string pixels = Pixels(input.pictures[frame]);
-      const std::string shown = Bytes(ppm);
+      const std::string shown = BytesOfFile(ppm);
       ASSERT_GE(shown.size(), pixels.size());
       EXPECT_TRUE(shown.substr(shown.size() - pixels.size()) == pixels) << program << frame;
     }
@@ -151,7 +151,7 @@ TEST_F(OtherReadersTest, GdcmShowsThePicturesPixels) {
   ASSERT_EQ(Run(absl::StrCat("gdcmraw -i ", plain, " -o ", raw)), 0) << Said();
   std::string expected;
   for (const std::string& picture : input.pictures) expected += Pixels(picture);
-  EXPECT_TRUE(Bytes(raw) == expected);
+  EXPECT_TRUE(BytesOfFile(raw) == expected);
 }
 
 TEST_F(OtherReadersTest, DcmtkReadsTheReport) {
@@ -183,11 +183,11 @@ TEST_F(OtherReadersTest, AReportWithoutABandSaysWhy) {
 TEST_F(OtherReadersTest, ASourceInJpeg2000IsAsGood) {
   if (!Has("gdcmconv")) GTEST_SKIP() << "libgdcm-tools is not installed";
   PredictionObjectsInput input = MakeInput();
-  const std::string plain = Bytes(Write(input).at("stl:skin").path);
+  const std::string plain = BytesOfFile(Write(input).at("stl:skin").path);
   const std::string packed = folder_ / "j2k.dcm";
   ASSERT_EQ(Run(absl::StrCat("gdcmconv --j2k ", input.source_header, " ", packed)), 0) << Said();
   input.source_header = packed;
-  EXPECT_TRUE(Bytes(Write(input).at("stl:skin").path) == plain);
+  EXPECT_TRUE(BytesOfFile(Write(input).at("stl:skin").path) == plain);
 }
 
 }  // namespace

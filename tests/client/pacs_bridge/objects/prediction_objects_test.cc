@@ -94,8 +94,9 @@ TEST_F(PredictionObjectsTest, FilesAreTheirOwnersAlone) {
 TEST_F(PredictionObjectsTest, TheSameInputGivesTheSameBytes) {
   const PredictionObjectsInput input = MakeInput();
   std::map<std::string, std::string> first;
-  for (const auto& [key, object] : Write(input)) first[key] = Bytes(object.path);
-  for (const auto& [key, object] : Write(input)) EXPECT_EQ(Bytes(object.path), first[key]) << key;
+  for (const auto& [key, object] : Write(input)) first[key] = BytesOfFile(object.path);
+  for (const auto& [key, object] : Write(input))
+    EXPECT_EQ(BytesOfFile(object.path), first[key]) << key;
 }
 
 TEST_F(PredictionObjectsTest, ModelsSayWhatTheyAre) {
@@ -162,7 +163,7 @@ TEST_F(PredictionObjectsTest, SourceImagesAreReferred) {
   EXPECT_EQ(count("stl:skin", DCM_SourceInstanceSequence), series_.instance_uids.size());
   EXPECT_EQ(count("capture", DCM_SourceImageSequence), series_.instance_uids.size());
   for (const char* key : {"stl:skin", "capture", "report"}) {
-    const std::string bytes = Bytes(objects.at(key).path);
+    const std::string bytes = BytesOfFile(objects.at(key).path);
     for (const std::string& uid : series_.instance_uids) EXPECT_THAT(bytes, HasSubstr(uid)) << key;
     EXPECT_THAT(bytes, HasSubstr(series_.series_uid)) << key;
   }
@@ -212,7 +213,7 @@ TEST_F(PredictionObjectsTest, WhatEveryoneElseMayReadNamesNoPatient) {
   options.private_text = std::string(40'000, 'x') + "Planted^Private";
   for (const WrittenObject& object : WriteAll(MakeInput(options))) {
     EXPECT_THAT(object.path, Not(HasSubstr("Planted")));
-    EXPECT_THAT(Bytes(object.path), Not(HasSubstr("Planted^Private")));  // private tags stay
+    EXPECT_THAT(BytesOfFile(object.path), Not(HasSubstr("Planted^Private")));  // private tags stay
   }
 }
 
@@ -233,9 +234,9 @@ TEST_F(PredictionObjectsTest, AHeaderWithoutPixelsIsEnough) {
   PredictionObjectsInput input = MakeInput();
   const std::string header = folder_ / "header.dcm";
   ASSERT_THAT(CopyHeaderOnly(input.source_header, header), IsOk());
-  const std::string with_pixels = Bytes(Write(input).at("stl:skin").path);
+  const std::string with_pixels = BytesOfFile(Write(input).at("stl:skin").path);
   input.source_header = header;
-  EXPECT_EQ(Bytes(Write(input).at("stl:skin").path), with_pixels);
+  EXPECT_EQ(BytesOfFile(Write(input).at("stl:skin").path), with_pixels);
 }
 
 TEST_F(PredictionObjectsTest, TimesAreInTheZoneOfTheStudy) {

@@ -17,18 +17,15 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
 
-using testing::IsOk;
-using testing::StatusIs;
-
 class BridgeQueueTest : public ::testing::Test {
  protected:
   BridgeQueueTest()
-      : folder_((testing::EmptyTestFolder("bridge_queue") / "state").string()),
+      : folder_((EmptyTestFolder("bridge_queue") / "state").string()),
         queue_(*BridgeQueue::Open(folder_)) {}
 
   static QueuedStudy Study() {
@@ -226,4 +223,4 @@ TEST(PatientIdentityTest, AnyChangeChangesTheDigest) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -19,24 +19,21 @@
 #include "tests/testing/test_authority.h"
 
 // The review page as curl sees it.
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
 
 using ::testing::HasSubstr;
-using testing::IsOk;
 using ::testing::Not;
 using ::testing::StartsWith;
-using testing::StatusIs;
 
 constexpr char kHostileName[] = "<script>alert(1)</script>^\"'&\x01\xff";
 
 class ReviewTest : public ::testing::Test {
  protected:
   ReviewTest()
-      : root_(testing::EmptyTestFolder("review")),
-        queue_(*BridgeQueue::Open((root_ / "state").string())) {
+      : root_(EmptyTestFolder("review")), queue_(*BridgeQueue::Open((root_ / "state").string())) {
     AddCase("1.2", {.id = "4711", .name = "Planted^Patricia", .birth_date = "19610203"}, "a");
     AddCase("1.3", {.id = "0815", .name = kHostileName, .birth_date = "19700101"}, "b");
     QueuedExport asked;
@@ -221,4 +218,4 @@ TEST(ShownTextTest, IsForPeople) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

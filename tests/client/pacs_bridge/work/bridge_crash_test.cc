@@ -22,12 +22,10 @@
 
 // kill -9 at every place between two writes, from received files to objects in the PACS: the next
 // process goes on, and the PACS has one of each object.
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
-
-using testing::IsOk;
 
 // The issue asks for twenty.
 constexpr int kLeastPoints = 20;
@@ -38,20 +36,20 @@ constexpr int kPointsToTheSecondQuestion = 10;
 class BridgeCrashTest : public ::testing::Test {
  protected:
   void Begin(const std::string& name) {
-    root_ = testing::EmptyTestFolder(name);
+    root_ = EmptyTestFolder(name);
     fs::create_directories(root_ / "world/server");
     fs::create_directories(root_ / "world/pacs");
     ASSERT_THAT(BridgeQueue::Open(state()), IsOk());
-    series_ = testing::WriteCtSeries(fs::path(state()) / "received");
+    series_ = WriteCtSeries(fs::path(state()) / "received");
   }
   // The PACS has given the series to another patient.
   void Merge() {
-    testing::CtSeriesOptions merged;
+    CtSeriesOptions merged;
     merged.study_uid = series_.study_uid;
     merged.series_uid = series_.series_uid;
     merged.patient_id = "MERGED-1";
     fs::create_directories(root_ / "merged");
-    fs::copy_file(testing::WriteCtSeries(root_ / "merged", merged).files.front(),
+    fs::copy_file(WriteCtSeries(root_ / "merged", merged).files.front(),
                   root_ / "world/merged.dcm");
   }
 
@@ -60,7 +58,7 @@ class BridgeCrashTest : public ::testing::Test {
   // Runs the steps; how they ended, and how many places were passed where they came to the end.
   ChildEnd Run(int kill_at, int* passed = nullptr) {
     ChildOptions options;
-    options.program = testing::ProgramPath("tissueform-bridge-steps");
+    options.program = ProgramPath("tissueform-bridge-steps");
     options.arguments = {state(), (root_ / "world").string(), absl::StrCat(kill_at)};
     options.output = ChildStream::Pipe();
     options.errors = ChildStream::File((root_ / "log").string());
@@ -75,7 +73,7 @@ class BridgeCrashTest : public ::testing::Test {
   }
 
   void ExpectOneOfEach() {
-    const std::vector<std::string> stores = testing::LinesOfFile(root_ / "world/pacs/stores");
+    const std::vector<std::string> stores = LinesOfFile(root_ / "world/pacs/stores");
     const std::set<std::string> different(stores.begin(), stores.end());
     EXPECT_EQ(different.size(), kObjects);
     size_t files = 0;
@@ -91,7 +89,7 @@ class BridgeCrashTest : public ::testing::Test {
   }
 
   fs::path root_;
-  testing::CtSeries series_;
+  CtSeries series_;
 };
 
 TEST_F(BridgeCrashTest, EveryPlaceOfDeathLeavesOneOfEachObject) {
@@ -140,4 +138,4 @@ TEST_F(BridgeCrashTest, WhatAPersonIsToldOfAMergedPatientOutlivesEveryDeath) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -22,10 +22,8 @@
 #include "core/base/mutex.h"
 #include "tests/client/pacs_bridge/work/bridge_work.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
-
-using testing::IsOk;
 
 constexpr std::chrono::seconds kPatience{30};
 
@@ -60,7 +58,7 @@ class HeardLog {
 };
 
 // Draws the pictures of the first export when it is let go.
-class SlowWriter final : public testing::HeaderWriter {
+class SlowWriter final : public HeaderWriter {
  public:
   explicit SlowWriter(HeardLog* log) : log_(log) {}
 
@@ -92,7 +90,7 @@ class SlowWriter final : public testing::HeaderWriter {
   int drawn_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
-class BridgeServiceTest : public testing::BridgeWork {
+class BridgeServiceTest : public BridgeWork {
  protected:
   BridgeServiceTest() {
     work_ = std::make_unique<ExportWork>(queue_.get(), server_.get(), pacs_.get(), &slow_,
@@ -159,7 +157,7 @@ TEST_F(BridgeServiceTest, AThreadThatHangsIsToldThoughTheOthersGoOn) {
 }
 
 // Draws when it is asked a second time.
-class LateWriter final : public testing::HeaderWriter {
+class LateWriter final : public HeaderWriter {
  public:
   explicit LateWriter(HeardLog* log) : log_(log) {}
 
@@ -194,7 +192,7 @@ TEST_F(BridgeServiceTest, WhatWasTakenBackIsLookedFor) {
 }
 
 // Tells of one export in a watch that lasts, and refuses the first word about it.
-class OnceRefusingServer final : public testing::FolderCaseServer {
+class OnceRefusingServer final : public FolderCaseServer {
  public:
   OnceRefusingServer(const std::filesystem::path& folder, v1::Export told, absl::Status refusal,
                      HeardLog* log)
@@ -248,4 +246,4 @@ INSTANTIATE_TEST_SUITE_P(Codes, RefusedWordTest,
                          });
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

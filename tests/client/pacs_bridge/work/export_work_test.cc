@@ -6,7 +6,6 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <set>
 #include <string>
@@ -18,34 +17,32 @@
 
 #include "core/base/error_reason.h"
 #include "tests/client/pacs_bridge/work/bridge_work.h"
+#include "tests/testing/file_bytes.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using testing::IsOk;
 using ::testing::Not;
-using testing::StatusIs;
 
-class ExportWorkTest : public testing::BridgeWork {
+class ExportWorkTest : public BridgeWork {
  protected:
   // The PACS gives the series another patient ID.
-  void Merge(const testing::CtSeries& series) {
-    testing::CtSeriesOptions merged;
+  void Merge(const CtSeries& series) {
+    CtSeriesOptions merged;
     merged.study_uid = series.study_uid;
     merged.series_uid = series.series_uid;
     merged.patient_id = "MERGED-1";
     fs::create_directories(root_ / "merged");
-    pacs_->headers[series.series_uid] =
-        testing::WriteCtSeries(root_ / "merged", merged).files.front();
+    pacs_->headers[series.series_uid] = WriteCtSeries(root_ / "merged", merged).files.front();
   }
 };
 
 TEST_F(ExportWorkTest, AnExportGoesToThePacsAfterAPersonsWord) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
@@ -59,7 +56,7 @@ TEST_F(ExportWorkTest, AnExportGoesToThePacsAfterAPersonsWord) {
 }
 
 TEST_F(ExportWorkTest, ABandThatCannotBeToldIsSaidAndTheReportGoesWithoutIt) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   server_->band = absl::InvalidArgumentError("ranges: 3 tets of 16");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -70,7 +67,7 @@ TEST_F(ExportWorkTest, ABandThatCannotBeToldIsSaidAndTheReportGoesWithoutIt) {
 }
 
 TEST_F(ExportWorkTest, ABandThatIsNotKnownIsNoReasonToWarn) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   EXPECT_THAT(Work("exports/1"), IsOk());
@@ -78,7 +75,7 @@ TEST_F(ExportWorkTest, ABandThatIsNotKnownIsNoReasonToWarn) {
 }
 
 TEST_F(ExportWorkTest, AServerWithoutRoomForABandIsAskedSomeTimesAndNotForever) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   server_->band = absl::ResourceExhaustedError("no memory");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -91,7 +88,7 @@ TEST_F(ExportWorkTest, AServerWithoutRoomForABandIsAskedSomeTimesAndNotForever) 
 }
 
 TEST_F(ExportWorkTest, APredictionOfAnotherMeshIsRefused) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   server_->mesh = "meshes/another";
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -104,7 +101,7 @@ TEST_F(ExportWorkTest, APredictionOfAnotherMeshIsRefused) {
 }
 
 TEST_F(ExportWorkTest, WhatIsDrawnOfAnExportThatHasFailedMeanwhileIsRemoved) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   const QueuedExport asked = *exports_.Get("exports/1");
   Confirm("exports/1");
@@ -116,7 +113,7 @@ TEST_F(ExportWorkTest, WhatIsDrawnOfAnExportThatHasFailedMeanwhileIsRemoved) {
 }
 
 TEST_F(ExportWorkTest, WhatWasTakenBackLeavesTheQueueWithItsPictures) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   for (const char* name : {"exports/1", "exports/2", "exports/3"}) {
     Ask(name, series);
     ASSERT_THAT(work_->Draw(*exports_.Get(name)), IsOk());
@@ -155,7 +152,7 @@ TEST_F(ExportWorkTest, ACaseOfAnotherBridgeIsLeftToItWhichIsSaid) {
 }
 
 TEST_F(ExportWorkTest, APacsThatIsDownIsWaitedFor) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   pacs_->away = absl::UnavailableError("the PACS does not answer");
@@ -168,7 +165,7 @@ TEST_F(ExportWorkTest, APacsThatIsDownIsWaitedFor) {
 }
 
 TEST_F(ExportWorkTest, APacsThatDoesNotLetUsInMayDoSoLater) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   for (const absl::Status& refusal : {absl::UnauthenticatedError("the TLS handshake fails"),
@@ -183,7 +180,7 @@ TEST_F(ExportWorkTest, APacsThatDoesNotLetUsInMayDoSoLater) {
 }
 
 TEST_F(ExportWorkTest, AStudyThatWasDeletedIsToldAndNothingIsStored) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   pacs_->headers.clear();
@@ -196,7 +193,7 @@ TEST_F(ExportWorkTest, AStudyThatWasDeletedIsToldAndNothingIsStored) {
 }
 
 TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   Merge(series);
@@ -216,7 +213,7 @@ TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
 }
 
 TEST_F(ExportWorkTest, APatientWhoIsMergedWhileTheServerHearsOfStoringGoesBackToo) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   // As a bridge leaves it that ended between the word to the server and its own row.
@@ -229,7 +226,7 @@ TEST_F(ExportWorkTest, APatientWhoIsMergedWhileTheServerHearsOfStoringGoesBackTo
 }
 
 TEST_F(ExportWorkTest, WhoIsSeenAnewIsWrittenWhenTheServerKnows) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   Merge(series);
@@ -252,7 +249,7 @@ class NoHeaderTest : public ExportWorkTest {
     pacs_->header_service = absl::UnimplementedError("the PACS does not offer C-GET");
   }
 
-  testing::CtSeries series_;
+  CtSeries series_;
 };
 
 TEST_F(NoHeaderTest, TheKeptHeaderStandsIfTheQueryNamesTheSamePatientAndThatIsSaid) {
@@ -347,7 +344,7 @@ class FullDisk {
 };
 
 TEST_F(ExportWorkTest, AFullDiskIsWaitedFor) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   writer_.more_bytes = 8 << 20;
@@ -364,7 +361,7 @@ TEST_F(ExportWorkTest, AFullDiskIsWaitedFor) {
 }
 
 // Refuses to draw a number of times.
-class RefusingWriter final : public testing::HeaderWriter {
+class RefusingWriter final : public HeaderWriter {
  public:
   absl::Status Draw(const ExportMaterial& material, const std::string& folder) override {
     if (refusals-- > 0) return absl::FailedPreconditionError("drawing the pictures failed");
@@ -376,7 +373,7 @@ class RefusingWriter final : public testing::HeaderWriter {
 TEST_F(ExportWorkTest, DrawingThatFailsIsTriedAgainButNotForEver) {
   RefusingWriter writer;
   ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer, {});
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   for (const bool for_ever : {false, true}) {
     const std::string name = for_ever ? "exports/2" : "exports/1";
     Ask(name, series);
@@ -395,14 +392,14 @@ TEST_F(ExportWorkTest, DrawingThatFailsIsTriedAgainButNotForEver) {
 }
 
 TEST_F(ExportWorkTest, TwoStudiesAndTwoPatientsKeepTheirOwn) {
-  testing::CtSeriesOptions other;
+  CtSeriesOptions other;
   other.patient_id = "OTHER";
   other.patient_name = "Other^Otto";
-  const testing::CtSeries first = ReceiveWithCase("a");
-  const testing::CtSeries again = ReceiveWithCase("b");
-  const testing::CtSeries second = ReceiveWithCase("c", other);
+  const CtSeries first = ReceiveWithCase("a");
+  const CtSeries again = ReceiveWithCase("b");
+  const CtSeries second = ReceiveWithCase("c", other);
   int number = 0;
-  for (const testing::CtSeries& series : {first, again, second}) {
+  for (const CtSeries& series : {first, again, second}) {
     const std::string name = absl::StrCat("exports/", ++number);
     Ask(name, series);
     Confirm(name);
@@ -420,15 +417,14 @@ TEST_F(ExportWorkTest, TwoStudiesAndTwoPatientsKeepTheirOwn) {
 }
 
 TEST_F(ExportWorkTest, NothingOutsideQueueImagesAndHeadersNamesThePatient) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
   EXPECT_THAT(Work("exports/1"), IsOk());
   for (const fs::path& place : {root_ / "server", root_ / "state/plans"}) {
     for (const auto& file : fs::recursive_directory_iterator(place)) {
       if (!file.is_regular_file()) continue;
-      std::ifstream stream(file.path(), std::ios::binary);
-      const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+      const std::string bytes = BytesOfFile(file.path());
       for (const char* planted : {"Planted", "PLANTED", "19610203"}) {
         EXPECT_THAT(bytes, Not(HasSubstr(planted))) << file.path();
         EXPECT_THAT(file.path().string(), Not(HasSubstr(planted)));
@@ -438,4 +434,4 @@ TEST_F(ExportWorkTest, NothingOutsideQueueImagesAndHeadersNamesThePatient) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

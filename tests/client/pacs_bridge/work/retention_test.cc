@@ -11,21 +11,18 @@
 
 #include "tests/client/pacs_bridge/work/bridge_work.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
 
-using testing::IsOk;
-using testing::StatusIs;
-
-class RetentionTest : public testing::BridgeWork {};
+class RetentionTest : public BridgeWork {};
 
 // Seconds of the clock that files have.
 int64_t DaysFromNow(int64_t days) { return std::time(nullptr) + days * 24 * 3600; }
 
 TEST_F(RetentionTest, ImagesAreDeletedWhenTheirTimeIsOverAndTheCaseStays) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   const RetentionOptions options;
   EXPECT_EQ(*DeleteOld(queue_.get(), options, 1'000'000 + 6 * 24 * 3600), 0);
   EXPECT_TRUE(fs::exists(series.files.front()));
@@ -40,7 +37,7 @@ TEST_F(RetentionTest, ImagesAreDeletedWhenTheirTimeIsOverAndTheCaseStays) {
 }
 
 TEST_F(RetentionTest, WhomNoCaseWasMadeOfIsForgottenWithTheHeaders) {
-  const testing::CtSeries series = Receive("a", {}, {4});
+  const CtSeries series = Receive("a", {}, {4});
   WaitQuietly();
   Settle();
   ASSERT_EQ(StateOf(series), SeriesState::kIncomplete);
@@ -53,20 +50,20 @@ TEST_F(RetentionTest, WhomNoCaseWasMadeOfIsForgottenWithTheHeaders) {
 }
 
 TEST_F(RetentionTest, WhoseCaseWasMadeStaysKnown) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(1000)), IsOk());
   EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "PLANTED-4711");
 }
 
 TEST_F(RetentionTest, AFileOfNoSeriesIsDeletedInItsTime) {
-  testing::CtSeriesOptions one;
+  CtSeriesOptions one;
   one.study_uid = "1.2.840.1";
   one.series_uid = "1.2.840.2";
-  testing::CtSeriesOptions other = one;
+  CtSeriesOptions other = one;
   other.study_uid = "1.2.840.3";
   Receive("a", one);
   Settle();
-  const testing::CtSeries stranger = Receive("b", other);
+  const CtSeries stranger = Receive("b", other);
   Settle();
   EXPECT_EQ(*DeleteOld(queue_.get(), {}, DaysFromNow(6)), 0);
   EXPECT_TRUE(fs::exists(stranger.files.front()));
@@ -76,7 +73,7 @@ TEST_F(RetentionTest, AFileOfNoSeriesIsDeletedInItsTime) {
 }
 
 TEST_F(RetentionTest, WhatComesAnewOfAnOldSeriesIsNotDeletedWhileItComes) {
-  const testing::CtSeries series = Receive("a", {}, {4});
+  const CtSeries series = Receive("a", {}, {4});
   WaitQuietly();
   Settle();
   ASSERT_EQ(StateOf(series), SeriesState::kIncomplete);
@@ -89,7 +86,7 @@ TEST_F(RetentionTest, WhatComesAnewOfAnOldSeriesIsNotDeletedWhileItComes) {
 }
 
 TEST_F(RetentionTest, WhatNobodyConfirmsFailsAndLeavesNoPictures) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   ASSERT_THAT(work_->Draw(*exports_.Get("exports/1")), IsOk());
   const fs::path folder = queue_->object_folder(exports_.Get("exports/1")->key);
@@ -105,7 +102,7 @@ TEST_F(RetentionTest, WhatNobodyConfirmsFailsAndLeavesNoPictures) {
 }
 
 TEST_F(RetentionTest, HowAnExportHasEndedIsKnownForItsTime) {
-  const testing::CtSeries series = ReceiveWithCase("a");
+  const CtSeries series = ReceiveWithCase("a");
   for (const char* name : {"exports/1", "exports/2"}) {
     Ask(name, series);
     Confirm(name);
@@ -125,4 +122,4 @@ TEST_F(RetentionTest, HowAnExportHasEndedIsKnownForItsTime) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -15,21 +15,19 @@
 #include "core/imaging/series/image_header.h"
 #include "tests/client/pacs_bridge/work/bridge_work.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using testing::IsOk;
 using ::testing::Not;
-using testing::StatusIs;
 
-class SeriesIntakeTest : public testing::BridgeWork {};
+class SeriesIntakeTest : public BridgeWork {};
 
 TEST_F(SeriesIntakeTest, ASeriesIsCompleteWhenNothingComesAnyMore) {
-  const testing::CtSeries series = Receive("a");
+  const CtSeries series = Receive("a");
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kReceiving);
   WaitQuietly();
@@ -39,7 +37,7 @@ TEST_F(SeriesIntakeTest, ASeriesIsCompleteWhenNothingComesAnyMore) {
 
 TEST_F(SeriesIntakeTest, ASeriesIsCompleteAtOnceWhereThePacsCountsAsMany) {
   count_ = 8;
-  const testing::CtSeries series = Receive("a");
+  const CtSeries series = Receive("a");
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kReceiving) << "its association is open";
   intake_->Ended({series.series_uid}, true);
@@ -49,7 +47,7 @@ TEST_F(SeriesIntakeTest, ASeriesIsCompleteAtOnceWhereThePacsCountsAsMany) {
 
 TEST_F(SeriesIntakeTest, ASeriesThatStopsMidwayIsNotBuiltUntilTheRestCompletesIt) {
   count_ = 8;
-  const testing::CtSeries series = Receive("a", {}, {6, 7});
+  const CtSeries series = Receive("a", {}, {6, 7});
   intake_->Ended({series.series_uid}, false);
   WaitQuietly();
   Settle();
@@ -66,23 +64,23 @@ TEST_F(SeriesIntakeTest, ASeriesThatStopsMidwayIsNotBuiltUntilTheRestCompletesIt
 }
 
 TEST_F(SeriesIntakeTest, AMissingSliceIsSeenWhereNobodyCounts) {
-  const testing::CtSeries series = Receive("a", {}, {4});
+  const CtSeries series = Receive("a", {}, {4});
   WaitQuietly();
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kIncomplete);
 }
 
 TEST_F(SeriesIntakeTest, CapturesInASeriesHideNoneOfItsSlicesAndGiveNoHeader) {
-  testing::CtSeriesOptions options;
+  CtSeriesOptions options;
   options.study_uid = "1.2.840.1";
   options.series_uid = "1.2.840.3";
-  testing::CtSeriesOptions captures = options;
+  CtSeriesOptions captures = options;
   captures.modality = "OT";
   captures.class_uid = std::string(kColourCaptureClass);
   captures.slices = 20;
   Receive("captures", captures);
   Settle();
-  const testing::CtSeries series = Receive("a", options);
+  const CtSeries series = Receive("a", options);
   WaitQuietly();
   Settle();
   ASSERT_EQ(StateOf(series), SeriesState::kChosen);
@@ -94,7 +92,7 @@ TEST_F(SeriesIntakeTest, CapturesInASeriesHideNoneOfItsSlicesAndGiveNoHeader) {
 }
 
 TEST_F(SeriesIntakeTest, AnAbortedAssociationLeavesNothingHalf) {
-  const testing::CtSeries series = Receive("a", {}, {6, 7});
+  const CtSeries series = Receive("a", {}, {6, 7});
   intake_->Ended({series.series_uid}, false);
   WaitQuietly();
   Settle();
@@ -102,13 +100,13 @@ TEST_F(SeriesIntakeTest, AnAbortedAssociationLeavesNothingHalf) {
 }
 
 TEST_F(SeriesIntakeTest, TheChoiceWaitsForAllSeriesOfTheStudy) {
-  testing::CtSeriesOptions sharp;
+  CtSeriesOptions sharp;
   sharp.study_uid = "1.2.840.1";
-  testing::CtSeriesOptions soft = sharp;
+  CtSeriesOptions soft = sharp;
   soft.kernel = "H30s";
-  const testing::CtSeries first = Receive("a", sharp);
+  const CtSeries first = Receive("a", sharp);
   now_ += std::chrono::seconds(20);
-  const testing::CtSeries second = Receive("b", soft);
+  const CtSeries second = Receive("b", soft);
   now_ += std::chrono::seconds(20);
   Settle();
   EXPECT_EQ(StateOf(first), SeriesState::kComplete);
@@ -119,21 +117,21 @@ TEST_F(SeriesIntakeTest, TheChoiceWaitsForAllSeriesOfTheStudy) {
 }
 
 TEST_F(SeriesIntakeTest, TheChoiceWaitsForASeriesThatThePacsHasAndHasNotSentYet) {
-  testing::CtSeriesOptions sharp;
+  CtSeriesOptions sharp;
   sharp.study_uid = "1.2.840.1";
-  testing::CtSeriesOptions soft = sharp;
+  CtSeriesOptions soft = sharp;
   soft.kernel = "H30s";
   soft.series_uid = "1.2.840.3";
   count_ = 8;
   elsewhere_ = {{.series_uid = soft.series_uid, .modality = "CT", .instances = 8}};
-  const testing::CtSeries first = Receive("a", sharp);
+  const CtSeries first = Receive("a", sharp);
   intake_->Ended({first.series_uid}, true);
   Settle();
   EXPECT_EQ(StateOf(first), SeriesState::kComplete);
   Settle();
   EXPECT_EQ(StateOf(first), SeriesState::kComplete);
   EXPECT_EQ(asked_, 1) << "the PACS is asked when something has changed";
-  const testing::CtSeries second = Receive("b", soft);
+  const CtSeries second = Receive("b", soft);
   intake_->Ended({second.series_uid}, true);
   Settle();
   EXPECT_EQ(StateOf(first), SeriesState::kPassedOver);
@@ -143,7 +141,7 @@ TEST_F(SeriesIntakeTest, TheChoiceWaitsForASeriesThatThePacsHasAndHasNotSentYet)
 TEST_F(SeriesIntakeTest, TheChoiceWaitsNoLongerThanTheStudyIsQuiet) {
   count_ = 8;
   elsewhere_ = {{.series_uid = "1.2.840.3", .modality = "CT", .instances = 8}};
-  const testing::CtSeries series = Receive("a");
+  const CtSeries series = Receive("a");
   intake_->Ended({series.series_uid}, true);
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kComplete);
@@ -155,7 +153,7 @@ TEST_F(SeriesIntakeTest, TheChoiceWaitsNoLongerThanTheStudyIsQuiet) {
 TEST_F(SeriesIntakeTest, TheChoiceDoesNotWaitForWhatNoRuleTakes) {
   count_ = 8;
   elsewhere_ = {{.series_uid = "1.2.840.3", .modality = "SR", .instances = 1}};
-  const testing::CtSeries series = Receive("a");
+  const CtSeries series = Receive("a");
   intake_->Ended({series.series_uid}, true);
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kChosen);
@@ -192,7 +190,7 @@ class SeriesInTwoPartsTest : public SeriesIntakeTest {
     std::ofstream(plan / "plan.json") << "{}";
   }
 
-  testing::CtSeries series_;
+  CtSeries series_;
 };
 
 TEST_F(SeriesInTwoPartsTest, WhatWasPassedOverForItsFirstPartIsChosenWhenTheRestCame) {
@@ -206,7 +204,7 @@ TEST_F(SeriesInTwoPartsTest, WhatWasPassedOverForItsFirstPartIsChosenWhenTheRest
 class ChosenInTwoPartsTest : public SeriesInTwoPartsTest {
  protected:
   ChosenInTwoPartsTest() {
-    SeriesRule rule = testing::SmallRule();
+    SeriesRule rule = SmallRule();
     rule.min_slices = 5;
     UseRule(rule);
   }
@@ -276,9 +274,9 @@ TEST_F(SeriesInTwoPartsTest, AnotherRecipeLeavesNothingOfTheEarlierPlan) {
 }
 
 TEST_F(SeriesIntakeTest, AnImageOfAnotherStudyIsToldAndLeftOut) {
-  testing::CtSeriesOptions one;
+  CtSeriesOptions one;
   one.series_uid = "1.2.840.2";
-  const testing::CtSeries series = Receive("a", one);
+  const CtSeries series = Receive("a", one);
   WaitQuietly();
   Settle();
   ASSERT_EQ(StateOf(series), SeriesState::kChosen);
@@ -290,9 +288,9 @@ TEST_F(SeriesIntakeTest, AnImageOfAnotherStudyIsToldAndLeftOut) {
 }
 
 TEST_F(SeriesIntakeTest, OfTwoStudiesNothingIsMade) {
-  testing::CtSeriesOptions one;
+  CtSeriesOptions one;
   one.series_uid = "1.2.840.2";
-  const testing::CtSeries series = Receive("a", one);
+  const CtSeries series = Receive("a", one);
   Settle();
   Receive("b", one);
   Settle();
@@ -303,7 +301,7 @@ TEST_F(SeriesIntakeTest, OfTwoStudiesNothingIsMade) {
 }
 
 TEST_F(SeriesIntakeTest, AChoiceIsToldOnce) {
-  const testing::CtSeries series = Receive("a");
+  const CtSeries series = Receive("a");
   WaitQuietly();
   ASSERT_OK_AND_ASSIGN(const std::vector<std::string> changed, intake_->Settle());
   ASSERT_EQ(StateOf(series), SeriesState::kChosen);
@@ -313,12 +311,12 @@ TEST_F(SeriesIntakeTest, AChoiceIsToldOnce) {
 }
 
 TEST_F(SeriesIntakeTest, TwoPatientsOfOneSeriesAreNobodys) {
-  testing::CtSeriesOptions one;
+  CtSeriesOptions one;
   one.study_uid = "1.2.840.1";
   one.series_uid = "1.2.840.2";
-  testing::CtSeriesOptions other = one;
+  CtSeriesOptions other = one;
   other.patient_id = "OTHER";
-  const testing::CtSeries series = Receive("a", one);
+  const CtSeries series = Receive("a", one);
   Receive("b", other);
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kFailed);
@@ -328,7 +326,7 @@ TEST_F(SeriesIntakeTest, TwoPatientsOfOneSeriesAreNobodys) {
 TEST_F(SeriesIntakeTest, AfterARestartWhatLiesThereIsTaken) {
   const fs::path folder = fs::path(queue_->received_folder()) / "a";
   fs::create_directories(folder);
-  const testing::CtSeries series = testing::WriteCtSeries(folder);
+  const CtSeries series = WriteCtSeries(folder);
   std::ofstream(folder / "x.partial") << "no image";
   ASSERT_THAT(intake_->Recover(), IsOk());
   Settle();
@@ -336,4 +334,4 @@ TEST_F(SeriesIntakeTest, AfterARestartWhatLiesThereIsTaken) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -21,19 +21,17 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-namespace tissueform {
+namespace tissueform::testing {
 namespace {
 
 using ::testing::HasSubstr;
-using testing::IsOk;
-using testing::StatusIs;
 
 constexpr std::chrono::seconds kLong{600};
 
 class TissueformCommandTest : public ::testing::Test {
  protected:
   TissueformCommandTest()
-      : folder_(testing::EmptyTestFolder("tissueform_command")),
+      : folder_(EmptyTestFolder("tissueform_command")),
         silent_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)),
         cancel_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     sockaddr_in place = {};
@@ -102,4 +100,4 @@ TEST_F(TissueformCommandTest, ItsTimeEndsIt) {
 }
 
 }  // namespace
-}  // namespace tissueform
+}  // namespace tissueform::testing

@@ -8,7 +8,6 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <thread>
 #include <unistd.h>
 
@@ -16,6 +15,7 @@
 #include "gtest/gtest.h"
 
 #include "core/base/process/pipe_stream.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
@@ -41,11 +41,6 @@ std::string ReadToEnd(int descriptor) {
     text.append(block.data(), static_cast<size_t>(count));
   }
   return text;
-}
-
-std::string Slurp(const fs::path& path) {
-  std::ifstream stream(path);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
 TEST(ChildProcessTest, ExitCodeIsAValue) {
@@ -109,8 +104,9 @@ TEST(ChildProcessTest, StreamsMayBeFiles) {
   options.output = ChildStream::File(out.string());
   ASSERT_OK_AND_ASSIGN(const auto child, ChildProcess::Start(options));
   EXPECT_EQ(child->Wait().exit_code, 0);
-  EXPECT_THAT(Slurp(out), AllOf(::testing::StartsWith("from a file||"), HasSubstr("same group\n"),
-                                ::testing::Not(HasSubstr("xx"))));
+  EXPECT_THAT(testing::BytesOfFile(out),
+              AllOf(::testing::StartsWith("from a file||"), HasSubstr("same group\n"),
+                    ::testing::Not(HasSubstr("xx"))));
   fs::remove(in);
   fs::remove(out);
 }

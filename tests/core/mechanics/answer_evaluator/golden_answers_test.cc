@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "core/mechanics/uncertainty/band_columns.h"
 #include "tests/core/mechanics/answer_evaluator/evaluated_problem.h"
 #include "tests/core/mechanics/uncertainty/uncertain_bar.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
@@ -63,8 +63,7 @@ std::string GoldenPath(const std::string& name, const char* suffix) {
 }
 
 std::string ReadGolden(const std::string& name, const char* suffix) {
-  std::ifstream stream(GoldenPath(name, suffix), std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  return BytesOfFile(GoldenPath(name, suffix));
 }
 
 // Where TISSUEFORM_GOLDEN_ANSWERS says, if it says so.

@@ -18,15 +18,12 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::LargestDistance;
 using testing::RandomNumbers;
 using testing::RandomPoses;
 using testing::StatusIs;
 
 TetMesh JitteredBar() { return testing::Bar({4, 6, 8}, 2.0, 0.2); }
-
-double LargestDistance(const Positions& a, const Positions& b) {
-  return (a - b).rowwise().norm().maxCoeff();
-}
 
 double EnergyOf(const MeshPreparation& preparation, const Positions& positions) {
   CellTransforms rotations;

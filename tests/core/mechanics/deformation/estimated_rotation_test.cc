@@ -13,6 +13,7 @@
 #include "core/mechanics/deformation/deformation_quality.h"
 #include "core/mechanics/deformation/gradient_field_deformer.h"
 #include "core/mesh/operators/gradient.h"
+#include "tests/testing/handle_problem.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -20,6 +21,7 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::LargestDistance;
 using testing::StatusIs;
 
 GradientFieldOptions Estimated(BlendMap blend = BlendMap::kCosine, int depth = 5,
@@ -53,10 +55,6 @@ class EstimatedRotationTest : public ::testing::Test {
     return std::vector<HandlePose>{pose};
   }();
 };
-
-double LargestDistance(const Positions& a, const Positions& b) {
-  return (a - b).rowwise().norm().maxCoeff();
-}
 
 TEST(BlendWeightsTest, AreTheSourcesFormulasForOneHandle) {
   CellField s(5, 1);

@@ -53,10 +53,6 @@ class RigidDeformerTest : public EveryDeformerTest {};
 class ElasticDeformerTest : public EveryDeformerTest {};
 class IteratingDeformerTest : public EveryDeformerTest {};
 
-double DistanceOf(const Positions& a, const Positions& b) {
-  return (a - b).rowwise().norm().maxCoeff();
-}
-
 // The largest distance of an answer from where `pose` puts each vertex.
 double DistanceFromPose(const MeshPreparation& preparation, const HandlePose& pose,
                         const Positions& answer) {
@@ -134,10 +130,10 @@ TEST_P(IteratingDeformerTest, WarmStartIsFasterAndEndsInTheSamePlace) {
   ASSERT_OK_AND_ASSIGN(const Deformation cold, Create(preparation)->Deform({pose}));
   EXPECT_TRUE(started.summary.converged);
   EXPECT_LT(started.summary.iterations, cold.summary.iterations);
-  EXPECT_LT(DistanceOf(started.positions, cold.positions), 1e-4);
+  EXPECT_LT(testing::LargestDistance(started.positions, cold.positions), 1e-4);
   // Back at rest in one jump: the last answer does not trap it.
   ASSERT_OK_AND_ASSIGN(const Deformation rest, warm->Deform({HandlePose{}}, control));
-  EXPECT_LT(DistanceOf(rest.positions, preparation->mesh().positions()), 1e-9);
+  EXPECT_LT(testing::LargestDistance(rest.positions, preparation->mesh().positions()), 1e-9);
 }
 
 TEST_P(IteratingDeformerTest, CallerSeesEveryAnswerAndMayStop) {

@@ -16,6 +16,7 @@
 
 #include "core/mechanics/deformation/deformation_quality.h"
 #include "core/mesh/operators/gradient.h"
+#include "tests/testing/handle_problem.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -24,6 +25,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using testing::IsOk;
+using testing::LargestDistance;
 using testing::StatusIs;
 
 using ::tissueform::testing::kInvalid;
@@ -137,10 +139,6 @@ Positions DenseOracle(const Problem& problem, const std::vector<HandlePose>& pos
     rhs.row(constrained[c]) = regions[c] < 0 ? v : ApplyPose(poses[regions[c]], v);
   }
   return factor.solve(rhs);
-}
-
-double LargestDistance(const Positions& a, const Positions& b) {
-  return (a - b).rowwise().norm().maxCoeff();
 }
 
 struct Case {

@@ -10,6 +10,7 @@
 
 #include "core/mechanics/deformation/gradient_field_deformer.h"
 #include "core/mesh/tet_topology.h"
+#include "tests/testing/handle_problem.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -17,6 +18,7 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::LargestDistance;
 using testing::StatusIs;
 
 struct SurfaceBar {
@@ -47,10 +49,6 @@ SurfaceBar MakeSurfaceBar() {
   }
   auto ends = ConstraintSet::Create(mesh->num_vertices(), low, {{"top", high}});
   return {*std::move(mesh), *std::move(ends)};
-}
-
-double LargestDistance(const Positions& a, const Positions& b) {
-  return (a - b).rowwise().norm().maxCoeff();
 }
 
 class SurfaceDeformerTest : public ::testing::Test {

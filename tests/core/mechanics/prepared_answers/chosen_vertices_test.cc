@@ -21,11 +21,8 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using testing::LargestDistance;
 using testing::RandomNumbers;
-
-double LargestDistance(const FloatPositions& a, const Positions& b) {
-  return (a.cast<double>() - b).rowwise().norm().maxCoeff();
-}
 
 // Coordinates that single precision rounds.
 Positions SevenPlaces() {

@@ -20,6 +20,7 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::LargestDistance;
 using testing::RandomNumbers;
 using testing::StatusIs;
 using ::tissueform::testing::kInvalid;
@@ -27,10 +28,6 @@ using ::tissueform::testing::kInvalid;
 constexpr double kDegree = std::numbers::pi / 180;
 
 TetMesh JitteredBar() { return testing::Bar({4, 4, 8}, 2.0, 0.2); }
-
-double LargestDistance(const FloatPositions& a, const Positions& b) {
-  return (a.cast<double>() - b).rowwise().norm().maxCoeff();
-}
 
 // A bar with handles, its prepared answers at all vertices and its converged ones.
 struct Prepared {

@@ -19,6 +19,7 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::LargestDistance;
 using testing::RandomNumbers;
 using testing::RandomPoses;
 using testing::StatusIs;
@@ -30,10 +31,6 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 TetMesh JitteredBar() { return testing::Bar({4, 6, 8}, 2.0, 0.2); }
 TetMesh Tongue() { return testing::LoadTestMesh("meshes/tet_sofa_tongue/volumetricTongue.vtu"); }
-
-double LargestDistance(const FloatPositions& a, const Positions& b) {
-  return (a.cast<double>() - b).rowwise().norm().maxCoeff();
-}
 
 // A mesh, its direct answers and its basis at all vertices.
 struct Prepared {

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include "absl/strings/str_replace.h"
 
 #include "core/mesh/io/tet_mesh_io.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -41,11 +41,6 @@ constexpr char kOneTet[] =
 <DataArray type="Int32" Name="offsets" format="ascii">4</DataArray>
 <DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells>
 </Piece></UnstructuredGrid></VTKFile>)";
-
-std::string Slurp(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 class DamagedMeshTest : public ::testing::Test {
  protected:
@@ -79,7 +74,7 @@ class DamagedMeshTest : public ::testing::Test {
     const std::string path = (folder_ / "bar.vtu").string();
     EXPECT_THAT(WriteTetMesh(path, {.mesh = bar, .point_data = {}, .cell_data = {{"pa", 1, pa}}}),
                 IsOk());
-    return Slurp(path);
+    return testing::BytesOfFile(path);
   }
 
   std::filesystem::path folder_;
@@ -117,7 +112,7 @@ TEST_F(DamagedMeshTest, FolderIsRefused) {
 }
 
 TEST_F(DamagedMeshTest, AsciiFileTruncatedAnywhereIsRefused) {
-  const std::string whole = Slurp(TestDataPath(kTongue));
+  const std::string whole = testing::BytesOfFile(TestDataPath(kTongue));
   for (int tenths = 0; tenths < 10; ++tenths) {
     EXPECT_THAT(Read(whole.substr(0, whole.size() * tenths / 10)), IsRefused("")) << tenths;
   }
@@ -131,7 +126,8 @@ TEST_F(DamagedMeshTest, CompressedFileTruncatedAnywhereIsRefused) {
 }
 
 TEST_F(DamagedMeshTest, OtherFormatsBehindTheEndingAreNamed) {
-  const std::string gmsh = Slurp(TestDataPath("meshes/tet_sofa_small_inverted/6_tetra_bad.msh"));
+  const std::string gmsh =
+      testing::BytesOfFile(TestDataPath("meshes/tet_sofa_small_inverted/6_tetra_bad.msh"));
   EXPECT_THAT(Read(gmsh), IsRefused("Gmsh"));
   EXPECT_THAT(Read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), IsRefused("OBJ"));
   EXPECT_THAT(Read("# vtk DataFile Version 3.0\nmesh\nASCII\n"), IsRefused("legacy VTK"));

@@ -20,8 +20,8 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using tissueform::testing::BytesOfFile;
 using tissueform::testing::MeshFolder;
-using tissueform::testing::Slurp;
 using tissueform::testing::StatusIs;
 using tissueform::testing::TestDataPath;
 
@@ -110,7 +110,7 @@ TEST_F(Gmsh1FormTest, RegionsOfTetsAreKept) {
 
 TEST_F(Gmsh1FormTest, RegionZeroAndElementsThatShareANumberAreRead) {
   const std::string text = absl::StrReplaceAll(
-      Slurp(TestDataPath("meshes/two_tets/gmsh1_ascii.msh")),
+      BytesOfFile(TestDataPath("meshes/two_tets/gmsh1_ascii.msh")),
       {{"1 4 7 1 4 1 2 3 4", "44 4 0 0 4 1 2 3 4"}, {"2 4 9 2 4 2 3 4 5", "44 4 0 0 4 2 3 4 5"}});
   ASSERT_OK_AND_ASSIGN(const TetMeshFile file, Read("same.msh", text));
   EXPECT_EQ(file.mesh.num_tets(), 2);
@@ -119,7 +119,7 @@ TEST_F(Gmsh1FormTest, RegionZeroAndElementsThatShareANumberAreRead) {
 
 TEST_F(Gmsh1FormTest, ElementsThatShareANumberMayBeIndented) {
   const std::string text =
-      absl::StrReplaceAll(Slurp(TestDataPath("meshes/two_tets/gmsh1_ascii.msh")),
+      absl::StrReplaceAll(BytesOfFile(TestDataPath("meshes/two_tets/gmsh1_ascii.msh")),
                           {{"1 4 7 1 4 1 2 3 4", " 44 4 0 0 4 1 2 3 4"},
                            {"2 4 9 2 4 2 3 4 5", "\t44 4 0 0 4 2 3 4 5"}});
   ASSERT_OK_AND_ASSIGN(const TetMeshFile file, Read("same.msh", text));
@@ -140,7 +140,7 @@ TEST_F(Gmsh1FormTest, OtherSolidsAreNamedAndFacesLeftOut) {
 }
 
 TEST_F(Gmsh1FormTest, WhatIsMissingOfADamagedFileIsNamed) {
-  const std::string good = Slurp(TestDataPath("meshes/two_tets/gmsh1_ascii.msh"));
+  const std::string good = BytesOfFile(TestDataPath("meshes/two_tets/gmsh1_ascii.msh"));
   const std::string cut = good.substr(0, good.find("$ENDELM"));
   EXPECT_THAT(Read("cut.msh", cut),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("$ENDELM")));
@@ -151,7 +151,7 @@ TEST_F(Gmsh1FormTest, WhatIsMissingOfADamagedFileIsNamed) {
 }
 
 TEST_F(Gmsh1FormTest, ElementOfAnotherLengthOrWithoutItsVertexIsRefused) {
-  const std::string good = Slurp(TestDataPath("meshes/two_tets/gmsh1_ascii.msh"));
+  const std::string good = BytesOfFile(TestDataPath("meshes/two_tets/gmsh1_ascii.msh"));
   for (const char* line : {"2 4 9 2 3 2 3 4", "2 4 9 2 5 2 3 4 5 1", "2 4 9 2 4 2 3 4 99"}) {
     EXPECT_THAT(Read("bad.msh", absl::StrReplaceAll(good, {{"2 4 9 2 4 2 3 4 5", line}})),
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("bad.msh")))

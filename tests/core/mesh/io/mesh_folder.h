@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 
@@ -13,13 +12,9 @@
 #include "gtest/gtest.h"
 
 #include "core/mesh/io/tet_mesh_io.h"
+#include "tests/testing/file_bytes.h"
 
 namespace tissueform::testing {
-
-inline std::string Slurp(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 // A folder of its own for every test.
 class MeshFolder : public ::testing::Test {

@@ -17,9 +17,9 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
+using tissueform::testing::BytesOfFile;
 using tissueform::testing::IsOk;
 using tissueform::testing::MeshFolder;
-using tissueform::testing::Slurp;
 using tissueform::testing::StatusIs;
 using tissueform::testing::TestDataPath;
 
@@ -55,7 +55,7 @@ class SurfaceFolder : public MeshFolder {
   }
   std::string Written(const std::string& ending) const {
     EXPECT_THAT(WriteTriangleMesh(Path("written" + ending), OnlySurface(Tetrahedron())), IsOk());
-    return Slurp(Path("written" + ending));
+    return BytesOfFile(Path("written" + ending));
   }
 };
 
@@ -110,7 +110,7 @@ TEST_P(EverySurfaceFormatTest, ChangedBytesNeverEndTheProgram) {
 }
 
 TEST_P(EverySurfaceFormatTest, AnotherFormatBehindTheEndingIsNamed) {
-  const std::string gmsh = Slurp(TestDataPath("meshes/two_tets/gmsh41_ascii.msh"));
+  const std::string gmsh = BytesOfFile(TestDataPath("meshes/two_tets/gmsh41_ascii.msh"));
   EXPECT_THAT(ReadSurface(std::string("a") + GetParam(), gmsh),
               StatusIs(absl::StatusCode::kInvalidArgument,
                        AllOf(HasSubstr("it is a Gmsh mesh"), HasSubstr(GetParam()))));
@@ -136,7 +136,7 @@ TEST_F(SurfaceFormatsTest, VtpKeepsArraysOfPointsAndTriangles) {
 
 TEST_F(SurfaceFormatsTest, StlIsBinaryAndSaysThatItIsNoMedicalDevice) {
   ASSERT_THAT(WriteTriangleMesh(Path("a.stl"), OnlySurface(Tetrahedron())), IsOk());
-  const std::string contents = Slurp(Path("a.stl"));
+  const std::string contents = BytesOfFile(Path("a.stl"));
   EXPECT_EQ(contents.size(), 80U + 4U + 4U * 50U);
   EXPECT_THAT(contents.substr(0, 80), HasSubstr("not a medical device"));
 }

@@ -25,9 +25,9 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::NanSensitiveDoubleEq;
+using tissueform::testing::BytesOfFile;
 using tissueform::testing::IsOk;
 using tissueform::testing::MeshFolder;
-using tissueform::testing::Slurp;
 using tissueform::testing::StatusIs;
 using tissueform::testing::TestDataPath;
 
@@ -43,8 +43,8 @@ class EveryTetFormatTest : public MeshFolder, public ::testing::WithParamInterfa
   // A changed copy of the file, for TetGen with its other half beside it, read without a word on
   // stderr.
   absl::StatusOr<TetMeshFile> ReadChanged(const std::string& contents) {
-    if (Ending() == ".ele") Write("mesh.node", Slurp(TwoTets("tetgen.node")));
-    if (Ending() == ".node") Write("mesh.ele", Slurp(TwoTets("tetgen.ele")));
+    if (Ending() == ".ele") Write("mesh.node", BytesOfFile(TwoTets("tetgen.node")));
+    if (Ending() == ".node") Write("mesh.ele", BytesOfFile(TwoTets("tetgen.ele")));
     return Read("mesh" + Ending(), contents);
   }
   std::string Ending() const { return std::filesystem::path(GetParam()).extension().string(); }
@@ -62,7 +62,7 @@ TEST_P(EveryTetFormatTest, HoldsTheSameMesh) {
 }
 
 TEST_P(EveryTetFormatTest, TruncatedAnywhereIsRefusedOrStillTheWholeGeometry) {
-  const std::string whole = Slurp(TwoTets(GetParam()));
+  const std::string whole = BytesOfFile(TwoTets(GetParam()));
   int refused = 0;
   for (size_t tenth = 0; tenth < 10; ++tenth) {
     const absl::StatusOr<TetMeshFile> file =
@@ -79,7 +79,7 @@ TEST_P(EveryTetFormatTest, TruncatedAnywhereIsRefusedOrStillTheWholeGeometry) {
 }
 
 TEST_P(EveryTetFormatTest, ChangedBytesNeverEndTheProgram) {
-  const std::string whole = Slurp(TwoTets(GetParam()));
+  const std::string whole = BytesOfFile(TwoTets(GetParam()));
   std::mt19937 generator(3);
   int refused = 0;
   for (int round = 0; round < 60; ++round) {
@@ -107,11 +107,11 @@ INSTANTIATE_TEST_SUITE_P(Files, EveryTetFormatTest,
 using TetFormatsTest = MeshFolder;
 
 TEST_F(TetFormatsTest, EndingIsTakenInAnyCase) {
-  EXPECT_THAT(Read("A.MSH", Slurp(TwoTets("gmsh22_ascii.msh"))), IsOk());
-  EXPECT_THAT(Read("A.Vtk", Slurp(TwoTets("legacy_ascii.vtk"))), IsOk());
-  EXPECT_THAT(Read("A.MESH", Slurp(TwoTets("medit.mesh"))), IsOk());
-  Write("A.ELE", Slurp(TwoTets("tetgen.ele")));
-  EXPECT_THAT(Read("A.NODE", Slurp(TwoTets("tetgen.node"))), IsOk());
+  EXPECT_THAT(Read("A.MSH", BytesOfFile(TwoTets("gmsh22_ascii.msh"))), IsOk());
+  EXPECT_THAT(Read("A.Vtk", BytesOfFile(TwoTets("legacy_ascii.vtk"))), IsOk());
+  EXPECT_THAT(Read("A.MESH", BytesOfFile(TwoTets("medit.mesh"))), IsOk());
+  Write("A.ELE", BytesOfFile(TwoTets("tetgen.ele")));
+  EXPECT_THAT(Read("A.NODE", BytesOfFile(TwoTets("tetgen.node"))), IsOk());
 }
 
 TEST_F(TetFormatsTest, LegacyVtkKeepsAllItsArrays) {
@@ -135,7 +135,7 @@ TEST_F(TetFormatsTest, GmshKeepsGroupsAndData) {
 }
 
 TEST_F(TetFormatsTest, GmshDataThatSkipTetsAreNotANumberThere) {
-  std::string text = Slurp(TwoTets("gmsh22_ascii.msh"));
+  std::string text = BytesOfFile(TwoTets("gmsh22_ascii.msh"));
   const std::string both = "2\n1 3000\n2 15000.5\n";
   text.replace(text.find(both), both.size(), "1\n2 15000.5\n");
   ASSERT_OK_AND_ASSIGN(const TetMeshFile file, Read("part.msh", text));
@@ -172,8 +172,8 @@ TEST_F(TetFormatsTest, GmshScriptIsNeitherReadNorRun) {
               StatusIs(absl::StatusCode::kInvalidArgument,
                        AllOf(HasSubstr("script.msh"), HasSubstr("of unknown format"))));
   Write("mesh.msh.opt", script);
-  EXPECT_THAT(Read("mesh.msh", Slurp(TwoTets("gmsh41_ascii.msh"))), IsOk());
-  EXPECT_THAT(Read("tail.msh", Slurp(TwoTets("gmsh41_ascii.msh")) + script + "$EndScript\n"),
+  EXPECT_THAT(Read("mesh.msh", BytesOfFile(TwoTets("gmsh41_ascii.msh"))), IsOk());
+  EXPECT_THAT(Read("tail.msh", BytesOfFile(TwoTets("gmsh41_ascii.msh")) + script + "$EndScript\n"),
               IsOk());
   EXPECT_FALSE(std::filesystem::exists(Path("pwned")));
 }
@@ -206,19 +206,19 @@ TEST_F(TetFormatsTest, TetgenAttributesMarkersAndRegionAreKept) {
 }
 
 TEST_F(TetFormatsTest, TetgenFileWithoutItsPartnerIsNotFound) {
-  EXPECT_THAT(Read("alone.ele", Slurp(TwoTets("tetgen.ele"))),
+  EXPECT_THAT(Read("alone.ele", BytesOfFile(TwoTets("tetgen.ele"))),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("alone.node")));
 }
 
 TEST_F(TetFormatsTest, TetgenRowsBeyondTheAnnouncedOnesAreRefused) {
-  Write("more.node", Slurp(TwoTets("tetgen.node")));
+  Write("more.node", BytesOfFile(TwoTets("tetgen.node")));
   EXPECT_THAT(
       Read("more.ele", "1 4 0\n1 1 2 3 4\n2 2 3 4 5\n"),
       StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("announces 1 rows, 2 follow")));
 }
 
 TEST_F(TetFormatsTest, TetsThatAreAllNegativeAreTurnedAndCounted) {
-  Write("turned.node", Slurp(TwoTets("tetgen.node")));
+  Write("turned.node", BytesOfFile(TwoTets("tetgen.node")));
   ASSERT_OK_AND_ASSIGN(const TetMeshFile file, Read("turned.ele", "2 4 0\n1 2 1 3 4\n2 3 2 4 5\n"));
   EXPECT_EQ(file.reoriented_tets, 2);
   EXPECT_GT(TetVolumes(file.mesh.positions(), file.mesh.tets()).minCoeff(), 0);
@@ -229,14 +229,14 @@ TEST_F(TetFormatsTest, TetsThatAreAllNegativeAreTurnedAndCounted) {
 }
 
 TEST_F(TetFormatsTest, FormatBehindAnotherEndingIsNamedInOneLine) {
-  const std::string gmsh = Slurp(TwoTets("gmsh41_ascii.msh"));
+  const std::string gmsh = BytesOfFile(TwoTets("gmsh41_ascii.msh"));
   for (const char* name : {"a.mesh", "a.vtk", "a.vtu"}) {
     EXPECT_THAT(Read(name, gmsh), StatusIs(absl::StatusCode::kInvalidArgument,
                                            AllOf(HasSubstr(name), HasSubstr("it is a Gmsh mesh"))));
   }
-  EXPECT_THAT(Read("a.msh", Slurp(TwoTets("medit.mesh"))),
+  EXPECT_THAT(Read("a.msh", BytesOfFile(TwoTets("medit.mesh"))),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("it is a MEDIT mesh")));
-  EXPECT_THAT(Read("a.node", Slurp(TwoTets("legacy_ascii.vtk"))),
+  EXPECT_THAT(Read("a.node", BytesOfFile(TwoTets("legacy_ascii.vtk"))),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("it is a legacy VTK file")));
   EXPECT_THAT(Read("a.txt", gmsh), StatusIs(absl::StatusCode::kInvalidArgument,
                                             HasSubstr("not one of the supported ones")));
@@ -259,7 +259,7 @@ TEST_F(TetFormatsTest, MeshOverTheMemoryLimitIsRefusedBeforeItIsTried) {
 TEST_F(TetFormatsTest, FullDiskKeepsTheOldMesh) {
   ASSERT_OK_AND_ASSIGN(const TetMeshFile small, ReadTetMesh(TwoTets("legacy_ascii.vtk")));
   ASSERT_THAT(WriteTetMesh(Path("mesh.vtu"), small), IsOk());
-  const std::string old = Slurp(Path("mesh.vtu"));
+  const std::string old = BytesOfFile(Path("mesh.vtu"));
   ASSERT_OK_AND_ASSIGN(const TetMeshFile large,
                        ReadTetMesh(TestDataPath("meshes/tet_sofa_tongue/volumetricTongue.vtu")));
   rlimit before{};
@@ -271,7 +271,7 @@ TEST_F(TetFormatsTest, FullDiskKeepsTheOldMesh) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, old_handler);
   EXPECT_THAT(status, StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("mesh.vtu")));
-  EXPECT_EQ(Slurp(Path("mesh.vtu")), old);
+  EXPECT_EQ(BytesOfFile(Path("mesh.vtu")), old);
 }
 
 struct RealMesh {

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -52,11 +52,6 @@ class TetMeshIoTest : public ::testing::Test {
 
 TetMeshFile OnlyMesh(const TetMesh& mesh) {
   return {.mesh = mesh, .point_data = {}, .cell_data = {}};
-}
-
-std::string Slurp(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
 template <typename T>
@@ -144,9 +139,10 @@ TEST_F(TetMeshIoTest, ReadsAsciiFilesOfOtherPrograms) {
 
 TEST_F(TetMeshIoTest, EveryFileCarriesTheNotice) {
   ASSERT_THAT(WriteTetMesh(Path("tet.vtu"), OnlyMesh(SingleTet())), IsOk());
-  EXPECT_THAT(Slurp(Path("tet.vtu")), AllOf(HasSubstr("Name=\"notice\""),
-                                            HasSubstr("<!-- Tissueform research software, not "
-                                                      "a medical device")));
+  EXPECT_THAT(
+      testing::BytesOfFile(Path("tet.vtu")),
+      AllOf(HasSubstr("Name=\"notice\""), HasSubstr("<!-- Tissueform research software, not "
+                                                    "a medical device")));
 }
 
 // As it was written once: arrays in raw bytes at the end, the notice a string among them.
@@ -162,7 +158,7 @@ TEST_F(TetMeshIoTest, FilesOfEarlierVersionsAreRead) {
 TEST_F(TetMeshIoTest, WritingTheSameMeshTwiceGivesTheSameBytes) {
   ASSERT_THAT(WriteTetMesh(Path("a.vtu"), OnlyMesh(SingleTet())), IsOk());
   ASSERT_THAT(WriteTetMesh(Path("b.vtu"), OnlyMesh(SingleTet())), IsOk());
-  EXPECT_EQ(Slurp(Path("a.vtu")), Slurp(Path("b.vtu")));
+  EXPECT_EQ(testing::BytesOfFile(Path("a.vtu")), testing::BytesOfFile(Path("b.vtu")));
 }
 
 TEST_F(TetMeshIoTest, FileOverTheLimitIsRefusedUnread) {
@@ -190,7 +186,7 @@ TEST_F(TetMeshIoTest, ArrayOfTheWrongLengthIsRefusedAndTheOldFileStays) {
   file.point_data.push_back({"short", 1, std::vector<double>{1, 2, 3}});
   EXPECT_THAT(WriteTetMesh(Path("tet.vtu"), file),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("\"short\" holds 3 values")));
-  EXPECT_EQ(Slurp(Path("tet.vtu")), "old");
+  EXPECT_EQ(testing::BytesOfFile(Path("tet.vtu")), "old");
   EXPECT_THAT(FilesLeft(), ::testing::ElementsAre("tet.vtu"));
 }
 

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string_view>
 #include <tuple>
@@ -24,6 +22,7 @@
 #include "core/planning/plan_building/viewer_surfaces.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/skin_places.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -237,11 +236,6 @@ TEST(PlanBuilderTest, PlanMadeAnewCanBeDraggedFartherThanPlannedByAnyModel) {
   }
 }
 
-std::string BytesOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 TEST(PlanBuilderTest, BytesDoNotDependOnThreads) {
   SetBlasThreads(1);
   Recipe recipe = CoarseRecipe();
@@ -254,8 +248,9 @@ TEST(PlanBuilderTest, BytesDoNotDependOnThreads) {
     std::filesystem::remove_all(folder);
     std::filesystem::create_directories(folder);
     ASSERT_THAT(WritePlan(build, folder), IsOk());
-    plans.push_back(BytesOf(folder + "/plan.json"));
-    meshes.push_back(BytesOf(folder + "/head.vtu") + BytesOf(folder + "/viewer.glb"));
+    plans.push_back(testing::BytesOfFile(folder + "/plan.json"));
+    meshes.push_back(testing::BytesOfFile(folder + "/head.vtu") +
+                     testing::BytesOfFile(folder + "/viewer.glb"));
   }
   std::filesystem::remove_all(folder);
   EXPECT_GT(meshes[0].size(), 100000U);

@@ -5,15 +5,14 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <unistd.h>
 
 #include <sys/socket.h>
 #include <sys/un.h>
 
 #include "core/planning/rendering/virtual_display.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/killed_starter.h"
 #include "tests/testing/scoped_environment.h"
 #include "tests/testing/status_matchers.h"
@@ -58,11 +57,6 @@ Figure SmallFigure() {
   return figure;
 }
 
-std::string Contents(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
 // Big-endian number of four bytes.
 int NumberAt(const std::string& bytes, size_t offset) {
   int number = 0;
@@ -87,7 +81,7 @@ class FigureTest : public ::testing::Test {
     Figure figure("", 120);
     figure.AddRow(100, {scene});
     EXPECT_THAT(figure.WritePng(folder_ + "/scene.png"), IsOk());
-    return std::hash<std::string>()(Contents(folder_ + "/scene.png"));
+    return std::hash<std::string>()(testing::BytesOfFile(folder_ + "/scene.png"));
   }
 
   // One for each test: tests run side by side.
@@ -99,7 +93,7 @@ class FigureTest : public ::testing::Test {
 TEST_F(FigureTest, PngHasTheSizeOfItsRowsWithTitleAndFooter) {
   const std::string path = folder_ + "/figure.png";
   ASSERT_THAT(SmallFigure().WritePng(path), IsOk());
-  const std::string bytes = Contents(path);
+  const std::string bytes = testing::BytesOfFile(path);
   ASSERT_GT(bytes.size(), 1000U);
   EXPECT_EQ(bytes.substr(0, 8), "\x89PNG\r\n\x1a\n");
   EXPECT_EQ(NumberAt(bytes, 16), 400);
@@ -110,7 +104,7 @@ TEST_F(FigureTest, PngHasTheSizeOfItsRowsWithTitleAndFooter) {
 TEST_F(FigureTest, SameFigureGivesTheSamePicture) {
   ASSERT_THAT(SmallFigure().WritePng(folder_ + "/one.png"), IsOk());
   ASSERT_THAT(SmallFigure().WritePng(folder_ + "/two.png"), IsOk());
-  EXPECT_EQ(Contents(folder_ + "/one.png"), Contents(folder_ + "/two.png"));
+  EXPECT_EQ(testing::BytesOfFile(folder_ + "/one.png"), testing::BytesOfFile(folder_ + "/two.png"));
 }
 
 TEST_F(FigureTest, PanelsWithRoomForEachOtherHaveOneCamera) {
