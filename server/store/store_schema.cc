@@ -198,6 +198,7 @@ absl::Status CopyReadableRows(Database& damaged, Database& fresh) {
   };
   // A statement is known by its address: they live as long as the databases' use of them.
   std::vector<std::array<std::string, 3>> statements;
+  statements.reserve(kStoredTables.size());
   for (const StoredTable& table : kStoredTables) {
     statements.push_back({SelectAll(table, ""), SelectAll(table, " DESC"), InsertRow(table)});
   }

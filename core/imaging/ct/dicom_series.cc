@@ -220,6 +220,7 @@ std::string JoinLines(std::vector<std::string> lines) {
 // "series 2: it has 24 slices, fewer than 60; series 5: usable, 231 axial slices, ...".
 std::string DescribeFindings(const std::vector<SeriesFacts>& facts, const SeriesRule& rule) {
   std::vector<std::string> lines;
+  lines.reserve(facts.size());
   for (const SeriesFacts& series : facts) {
     const std::string against = WhatIsAgainst(series, rule);
     lines.push_back(
@@ -265,6 +266,7 @@ absl::StatusOr<Candidate> ChooseByRule(const std::vector<Candidate>& candidates,
     return SeveralWanted(candidates, "");
   }
   std::vector<SeriesFacts> facts;
+  facts.reserve(candidates.size());
   for (const Candidate& candidate : candidates) facts.push_back(FactsOf(candidate));
   SeriesRule rule;
   rule.hounsfield = !has_offset;
