@@ -87,24 +87,25 @@ std::string Escaped(absl::string_view text) {
   return escaped;
 }
 
-std::string Attribute(const char* name, absl::string_view value) {
+std::string XmlAttribute(const char* name, absl::string_view value) {
   return absl::StrCat(" ", name, "=\"", Escaped(value), "\"");
 }
 
 std::string Coded(const char* element, const Code& code) {
-  return absl::StrCat("<", element, Attribute("csd-code", code.code),
-                      Attribute("codeSystemName", code.system),
-                      Attribute("originalText", code.text), "/>");
+  return absl::StrCat("<", element, XmlAttribute("csd-code", code.code),
+                      XmlAttribute("codeSystemName", code.system),
+                      XmlAttribute("originalText", code.text), "/>");
 }
 
 std::string Identification(const AuditEvent& event) {
   const KindCodes codes = CodesOf(event.kind);
   const bool failed = !event.outcome.ok() || event.kind == AuditEvent::Kind::kNodeRefused;
   std::string xml = absl::StrCat(
-      "<EventIdentification", Attribute("EventActionCode", std::string(1, codes.action)),
-      Attribute("EventDateTime",
-                absl::FormatTime("%Y-%m-%d%ET%H:%M:%E3SZ", event.time, absl::UTCTimeZone())),
-      Attribute("EventOutcomeIndicator", failed ? "8" : "0"), ">", Coded("EventID", codes.event));
+      "<EventIdentification", XmlAttribute("EventActionCode", std::string(1, codes.action)),
+      XmlAttribute("EventDateTime",
+                   absl::FormatTime("%Y-%m-%d%ET%H:%M:%E3SZ", event.time, absl::UTCTimeZone())),
+      XmlAttribute("EventOutcomeIndicator", failed ? "8" : "0"), ">",
+      Coded("EventID", codes.event));
   if (codes.type.code != nullptr) xml += Coded("EventTypeCode", codes.type);
   if (!event.outcome.ok()) {
     absl::StrAppend(&xml, "<EventOutcomeDescription>", Escaped(event.outcome.message()),
@@ -123,14 +124,14 @@ const char* HostType(const std::string& host) {
 
 std::string Participant(const AuditParticipant& participant) {
   std::string xml =
-      absl::StrCat("<ActiveParticipant", Attribute("UserID", participant.user_id),
-                   Attribute("UserIsRequestor", participant.is_requestor ? "true" : "false"));
+      absl::StrCat("<ActiveParticipant", XmlAttribute("UserID", participant.user_id),
+                   XmlAttribute("UserIsRequestor", participant.is_requestor ? "true" : "false"));
   if (!participant.ae_title.empty()) {
-    xml += Attribute("AlternativeUserID", absl::StrCat("AETITLES=", participant.ae_title));
+    xml += XmlAttribute("AlternativeUserID", absl::StrCat("AETITLES=", participant.ae_title));
   }
   if (!participant.host.empty()) {
-    xml += Attribute("NetworkAccessPointID", participant.host);
-    xml += Attribute("NetworkAccessPointTypeCode", HostType(participant.host));
+    xml += XmlAttribute("NetworkAccessPointID", participant.host);
+    xml += XmlAttribute("NetworkAccessPointTypeCode", HostType(participant.host));
   }
   xml += ">";
   switch (participant.role) {
@@ -152,9 +153,9 @@ std::string Participant(const AuditParticipant& participant) {
 // `inside` comes after the code of the ID's type.
 std::string Object(absl::string_view id, const char* type, const char* role, const Code& id_type,
                    absl::string_view inside) {
-  return absl::StrCat("<ParticipantObjectIdentification", Attribute("ParticipantObjectID", id),
-                      Attribute("ParticipantObjectTypeCode", type),
-                      Attribute("ParticipantObjectTypeCodeRole", role), ">",
+  return absl::StrCat("<ParticipantObjectIdentification", XmlAttribute("ParticipantObjectID", id),
+                      XmlAttribute("ParticipantObjectTypeCode", type),
+                      XmlAttribute("ParticipantObjectTypeCodeRole", role), ">",
                       Coded("ParticipantObjectIDTypeCode", id_type), inside,
                       "</ParticipantObjectIdentification>");
 }
@@ -164,8 +165,8 @@ std::string Study(const AuditedStudy& study) {
   if (!study.objects_of_class.empty()) {
     inside += "<ParticipantObjectDescription>";
     for (const auto& [uid, count] : study.objects_of_class) {
-      absl::StrAppend(&inside, "<SOPClass", Attribute("UID", uid),
-                      Attribute("NumberOfInstances", absl::StrCat(count)), "/>");
+      absl::StrAppend(&inside, "<SOPClass", XmlAttribute("UID", uid),
+                      XmlAttribute("NumberOfInstances", absl::StrCat(count)), "/>");
     }
     inside += "</ParticipantObjectDescription>";
   }
@@ -179,11 +180,12 @@ std::string Study(const AuditedStudy& study) {
 }
 
 std::string Query(const std::string& query) {
-  return Object(kStudyRootFind, "2", "3", {"110181", kDcm, "SOP Class UID"},
-                absl::StrCat("<ParticipantObjectQuery>", absl::Base64Escape(query),
-                             "</ParticipantObjectQuery><ParticipantObjectDetail",
-                             Attribute("type", "TransferSyntax"),
-                             Attribute("value", absl::Base64Escape(kExplicitLittleEndian)), "/>"));
+  return Object(
+      kStudyRootFind, "2", "3", {"110181", kDcm, "SOP Class UID"},
+      absl::StrCat("<ParticipantObjectQuery>", absl::Base64Escape(query),
+                   "</ParticipantObjectQuery><ParticipantObjectDetail",
+                   XmlAttribute("type", "TransferSyntax"),
+                   XmlAttribute("value", absl::Base64Escape(kExplicitLittleEndian)), "/>"));
 }
 
 }  // namespace
@@ -192,8 +194,8 @@ std::string ToAuditMessage(const AuditEvent& event) {
   std::string xml = "<?xml version=\"1.0\" encoding=\"UTF-8\"?><AuditMessage>";
   xml += Identification(event);
   for (const AuditParticipant& participant : event.participants) xml += Participant(participant);
-  absl::StrAppend(&xml, "<AuditSourceIdentification", Attribute("AuditSourceID", event.source),
-                  "><AuditSourceTypeCode", Attribute("csd-code", "4"),
+  absl::StrAppend(&xml, "<AuditSourceIdentification", XmlAttribute("AuditSourceID", event.source),
+                  "><AuditSourceTypeCode", XmlAttribute("csd-code", "4"),
                   "/></AuditSourceIdentification>");
   if (!event.query.empty()) xml += Query(event.query);
   if (event.study.has_value()) xml += Study(*event.study);
