@@ -55,7 +55,7 @@ std::chrono::system_clock::time_point TimeOf(const ASN1_TIME* time) {
   return std::chrono::system_clock::from_time_t(timegm(&parts));
 }
 
-std::string TextOf(const ASN1_STRING* string) {
+std::string TextOfAsn1(const ASN1_STRING* string) {
   return {reinterpret_cast<const char*>(ASN1_STRING_get0_data(string)),
           static_cast<size_t>(ASN1_STRING_length(string))};
 }
@@ -86,7 +86,7 @@ std::vector<std::string> NamesOf(const X509* certificate) {
   const X509_NAME* subject = X509_get_subject_name(certificate);
   const int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
   if (at >= 0) {
-    names.push_back(TextOf(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at))));
+    names.push_back(TextOfAsn1(X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at))));
   }
   return names;
 }
