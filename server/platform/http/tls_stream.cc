@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 constexpr int kPollMilliseconds = 100;
 constexpr std::chrono::milliseconds kBetweenLooks{2};
@@ -47,9 +47,9 @@ struct TlsStream::Connection {
   curl_socket_t socket = CURL_SOCKET_BAD;
   const std::atomic<bool>* stopping = nullptr;
 
-  absl::Status CheckPatience(Clock::time_point deadline) const {
+  absl::Status CheckPatience(SteadyClock::time_point deadline) const {
     if (stopping != nullptr && *stopping) return absl::CancelledError("the program ends");
-    if (Clock::now() < deadline) return absl::OkStatus();
+    if (SteadyClock::now() < deadline) return absl::OkStatus();
     return absl::DeadlineExceededError("the peer does not read");
   }
 
@@ -83,14 +83,14 @@ absl::StatusOr<std::unique_ptr<TlsStream>> TlsStream::Connect(const Peer& peer) 
 }
 
 absl::Status TlsStream::Send(absl::string_view bytes, std::chrono::milliseconds patience) {
-  Clock::time_point deadline = Clock::now() + patience;
+  SteadyClock::time_point deadline = SteadyClock::now() + patience;
   while (!bytes.empty()) {
     size_t sent = 0;
     const CURLcode code =
         curl_easy_send(connection_->handle.get(), bytes.data(), bytes.size(), &sent);
     if (code == CURLE_OK) {
       bytes.remove_prefix(sent);
-      deadline = Clock::now() + patience;
+      deadline = SteadyClock::now() + patience;
       continue;
     }
     if (code != CURLE_AGAIN) return CurlError(code);
@@ -102,12 +102,12 @@ absl::Status TlsStream::Send(absl::string_view bytes, std::chrono::milliseconds 
 }
 
 absl::Status TlsStream::WaitForAcknowledgment(std::chrono::milliseconds patience) {
-  Clock::time_point deadline = Clock::now() + patience;
+  SteadyClock::time_point deadline = SteadyClock::now() + patience;
   for (int before = 0;;) {
     TF_ASSIGN_OR_RETURN(const int unacknowledged, connection_->Unacknowledged());
     if (!IsOpen()) return absl::UnavailableError("the peer has closed the connection");
     if (unacknowledged == 0) return absl::OkStatus();
-    if (unacknowledged != before) deadline = Clock::now() + patience;
+    if (unacknowledged != before) deadline = SteadyClock::now() + patience;
     before = unacknowledged;
     TF_RETURN_IF_ERROR(connection_->CheckPatience(deadline));
     std::this_thread::sleep_for(kBetweenLooks);
