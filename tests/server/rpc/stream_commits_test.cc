@@ -76,8 +76,8 @@ TEST_F(StreamCommitsTest, TellsWhyACommitFailed) {
 TEST_F(StreamCommitsTest, AnAnswerAfterTheEndOfTheStreamGoesNowhere) {
   {
     StreamCommits commits(
-        [this](const std::shared_ptr<const Session>& /*session*/, std::vector<HandlePose> /*poses*/,
-               StreamCommits::Outcome done) {
+        [this](const std::shared_ptr<const Session>& /*session*/,
+               const std::vector<HandlePose>& /*poses*/, StreamCommits::Outcome done) {
           sent_.push_back({0, std::move(done)});
         },
         [this](uint64_t sequence, const absl::Status& /*outcome*/) {

@@ -59,7 +59,8 @@ class StreamDragTest : public testing::StreamPartsTest {
  protected:
   std::shared_ptr<const StreamConfiguration> Configure(
       std::shared_ptr<Session> session, const v1::DeformConfiguration& request = Request()) {
-    auto configuration = ReadConfiguration(*ReadStreamRequest(request, limits_), session);
+    auto configuration =
+        ReadConfiguration(*ReadStreamRequest(request, limits_), std::move(session));
     EXPECT_TRUE(configuration.ok()) << configuration.status();
     return *configuration;
   }

@@ -36,7 +36,7 @@ class StreamPartsTest : public ::testing::Test {
     return request;
   }
 
-  const ServiceLimits limits_;
+  const ServiceLimits limits_ = {};
   FakeClock clock_;
   MemoryBudget budget_{64 << 20};
   MeshCatalog catalog_{{}, &budget_};
