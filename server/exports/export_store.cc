@@ -33,7 +33,7 @@ absl::StatusOr<Records> SqlExportStore::Load() {
 absl::Status SqlExportStore::Put(const ExportRecord& record) {
   const std::string bytes = Seal(SerializeExport(record));
   return database_->Run({.work = [&](SqlTransaction& transaction) -> absl::Status {
-    // What is kept in these very words already was kept by a commit whose answer was lost.
+    // An identical stored record comes from a commit whose answer was lost.
     TF_ASSIGN_OR_RETURN(
         const SqlRows rows,
         record.version <= 1

@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-// When a session that nobody uses any longer may be evicted (SessionTable::kInUse).
+// When a session that is no longer in use may be evicted (SessionTable::kInUse).
 constexpr int64_t kSessionsInUseMs = 10'000;
 
 std::string Mebibytes(int64_t bytes) {

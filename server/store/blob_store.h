@@ -81,7 +81,8 @@ class BlobStore {
   // after all was given. NotFound.
   absl::Status Read(const std::string& sha256,
                     const std::function<absl::Status(absl::string_view)>& sink);
-  // For reading, also when it is removed meanwhile. The digest is not checked. Errors: NotFound.
+  // Opens it for reading, which still works after its removal. The digest is not checked. Errors:
+  // NotFound.
   absl::StatusOr<OpenFile> OpenBlob(const std::string& sha256) const;
   // Errors: NotFound.
   absl::StatusOr<int64_t> Size(const std::string& sha256) const;

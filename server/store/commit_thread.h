@@ -42,8 +42,8 @@ class CommitThread {
   // another connection, which only reads.
   CommitThread(std::unique_ptr<Database> database, std::unique_ptr<Database> reader,
                std::function<absl::Status()> check);
-  // For a database in memory, whose commits cost nothing that could be shared: there is no thread,
-  // and jobs run where they are submitted, one at a time.
+  // For a database in memory, where grouping commits gains nothing: there is no thread, and Submit
+  // and Run execute jobs on the caller's thread, one at a time.
   explicit CommitThread(std::unique_ptr<Database> in_memory);
   // Answers all that was submitted.
   ~CommitThread();
@@ -55,10 +55,9 @@ class CommitThread {
   // Submits and waits. Any thread but its own, where it is an Internal error.
   absl::Status Run(Job job);
 
-  // Reads what was committed, beside the thread and what waits for it; in memory as Run. Any
+  // Reads committed data on the caller's thread without waiting for jobs; in memory as Run. Any
   // thread. `work` may open a transaction and must end it.
   absl::Status Read(const std::function<absl::Status(Database&)>& work);
-  // Whether there is no thread.
   bool in_memory() const { return !thread_.joinable(); }
 
   // Of each job, from Submit to its answer, and of each Read.
@@ -80,7 +79,7 @@ class CommitThread {
   const std::function<absl::Status()> check_;
   bool log_holds_erased_ = false;
 
-  // Held while the log is truncated, too: a reader in the way would keep what was deleted in it.
+  // Also held while the log is truncated: an open read would keep deleted data in it.
   Mutex reader_mutex_;
   const std::unique_ptr<Database> reader_ ABSL_PT_GUARDED_BY(reader_mutex_);  // null: in memory
 

@@ -17,7 +17,7 @@
 namespace tissueform {
 namespace {
 
-// Whoever adds a case counts those that are there: one after the other.
+// Number for TakeTurns: cases are counted and added by one transaction at a time.
 constexpr int64_t kCountAlone = 6073473466130133613;
 
 absl::StatusOr<CaseRecord> FindRow(SqlTransaction& transaction, const CaseKey& key) {
@@ -39,7 +39,7 @@ absl::Status CheckRoom(SqlTransaction& transaction, int most) {
   return rows.Integer(0, 0) < most ? absl::OkStatus() : TooManyCases(most);
 }
 
-// The row as it is then: of one that was there only last_used_s rises.
+// Returns the stored row. Of an existing row only last_used_s changes (it rises).
 absl::StatusOr<CaseRecord> KeepRow(SqlTransaction& transaction, const CaseRecord& record,
                                    int most) {
   TF_RETURN_IF_ERROR(transaction.TakeTurns(kCountAlone));
@@ -51,7 +51,7 @@ absl::StatusOr<CaseRecord> KeepRow(SqlTransaction& transaction, const CaseRecord
   if (!absl::IsNotFound(found.status()) && !absl::IsDataLoss(found.status())) return found;
   TF_RETURN_IF_ERROR(CheckRoom(transaction, most));
   const std::string bytes = Seal(SerializeCaseRecord(record));
-  // In place of a row that cannot be read.
+  // Replaces an unreadable row.
   TF_RETURN_IF_ERROR(transaction.Run(
       "INSERT INTO cases (sha256, owner, record, last_used_s) VALUES ($1, $2, $3, $4) ON CONFLICT "
       "(sha256, owner) DO UPDATE SET record = excluded.record, last_used_s = excluded.last_used_s",
@@ -59,7 +59,7 @@ absl::StatusOr<CaseRecord> KeepRow(SqlTransaction& transaction, const CaseRecord
   return record;
 }
 
-// As SQL puts a key into words.
+// In the form that the statement of List builds from its columns.
 std::string NamesOf(const std::set<CaseKey>& keys) {
   std::set<std::string> names;
   for (const CaseKey& key : keys) names.insert(key.sha256 + absl::BytesToHexString(key.owner));
@@ -196,7 +196,7 @@ absl::StatusOr<std::vector<CaseKey>> SqlCaseStore::RemoveUnused(int64_t before_s
   std::vector<CaseKey> removed;
   for (size_t row = 0; row < rows.size(); ++row) {
     CaseKey key{.sha256 = std::string(rows.Text(row, 0)), .owner = std::string(rows.Text(row, 1))};
-    // It may have been used, or removed by another server, in the meantime.
+    // It may have been used, or removed by another server, since the query.
     const absl::Status status = DeleteUnused(key, before_s);
     if (absl::IsNotFound(status)) continue;
     TF_RETURN_IF_ERROR(status);

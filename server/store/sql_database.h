@@ -19,24 +19,24 @@
 
 #include "core/base/duration_histogram.h"
 
-// The one way in which the stores use a database. Two drivers implement it: sqlite_database.h for
-// one server, postgres_store/postgres_database.h for several that share what they keep.
+// The interface through which all stores use a database. It has two drivers: sqlite_database.h for
+// one server, postgres_store/postgres_database.h for servers that share a database.
 //
-// A statement is written once, in PostgreSQL's words with parameters $1, $2, ...; sqlite_dialect.h
-// lists what SQLite calls differently.
+// A statement is written once, in PostgreSQL's dialect with parameters $1, $2, ...;
+// sqlite_dialect.h translates it for SQLite.
 namespace tissueform {
 
-// A parameter that a column of bytes is compared with or set to.
+// A parameter for a column of bytes (bytea, BLOB).
 struct SqlBytes {
   absl::string_view bytes = {};
 };
 // Text and bytes must outlive the call.
 using SqlValue = std::variant<int64_t, absl::string_view, SqlBytes>;
 
-// What a statement has answered: rows and columns from 0.
+// The result of a statement: rows and columns from 0.
 class SqlRows {
  public:
-  using Row = std::vector<std::string>;  // numbers as text; bytes as they are; NULL as nothing
+  using Row = std::vector<std::string>;  // numbers as text; bytes as they are; NULL as empty
 
   SqlRows() = default;
   explicit SqlRows(std::vector<Row> rows) : rows_(std::move(rows)) {}
@@ -44,7 +44,7 @@ class SqlRows {
   size_t size() const { return rows_.size(); }
   bool empty() const { return rows_.empty(); }
   absl::string_view Text(size_t row, size_t column) const { return rows_[row][column]; }
-  // 0 for what is no number.
+  // 0 for text that is not a number.
   int64_t Integer(size_t row, size_t column) const;
 
  private:
@@ -68,29 +68,29 @@ class SqlTransaction {
     return Query(sql, values).status();
   }
 
-  // Until this transaction's end nobody else gets past a call with this number.
+  // Blocks while another transaction that has called it with this number is open.
   virtual absl::Status TakeTurns(int64_t number) = 0;
-  // What is read from here on is of one moment. First of all in a transaction that only reads.
+  // All later reads of this transaction see one snapshot. Must be its first call; read-only.
   virtual absl::Status ReadOneMoment() = 0;
 };
 
 using SqlWork = std::function<absl::Status(SqlTransaction&)>;
 
 struct SqlJob {
-  // Nothing of it stays when it fails. It may be called again after a commit that failed, so what
-  // it leaves outside the database must be what its last call left.
+  // If it fails, nothing is stored. It may be called again after a failed commit, so each call must
+  // set its outputs from the start.
   SqlWork work;
-  // It changes nothing: it need not wait for what is being committed.
+  // It only reads, so it need not wait for commits.
   bool reads = false;
-  // A second commit changes nothing, so that one with an unknown outcome may be tried again.
+  // Committing it twice has the effect of once, so a commit with an unknown outcome may be retried.
   bool repeatable = false;
-  // What it deletes has left the files of the database when it is answered (docs/operations.md).
+  // Deleted data is gone from the database's files before the answer (docs/operations.md).
   bool erases = false;
 };
 
 // A database, or this server's connections to it.
 //
-// What was answered is as durable as the database. Errors: what the work says, and the driver's own
+// A result is durable when it is returned. Errors: those of the work, and the driver's own
 // (ResourceExhausted: the disk is full; Unavailable: the database is away). Thread-safe; must
 // outlive its calls.
 class SqlDatabase {
@@ -105,16 +105,17 @@ class SqlDatabase {
   // Returns at once or soon. Jobs of one key run in the order of their calls. `done` is called
   // once, on any thread, without a lock held.
   virtual void Submit(const std::string& key, SqlJob job, StatusCallback done) = 0;
-  // As Submit, but behind nothing that was submitted before, and for 2 s at most.
+  // As Submit, but does not wait for earlier jobs; takes at most 2 s where servers share the
+  // database.
   virtual void Peek(const std::string& key, SqlJob job, StatusCallback done) = 0;
 
-  // Whether other servers use it, too.
+  // Whether other servers use it too.
   virtual bool shared() const = 0;
-  // Of each job, from its call to its answer; null where nothing is kept.
+  // Time of each job from call to answer; null for a database in memory.
   virtual const DurationHistogram* latency() const = 0;
 };
 
-// What `work` finds in rows.
+// Runs `work`, which only reads, and returns its result.
 template <typename Result>
 absl::StatusOr<Result> ReadSql(SqlDatabase* database,
                                const std::function<absl::StatusOr<Result>(SqlTransaction&)>& work) {
@@ -129,7 +130,7 @@ absl::StatusOr<Result> ReadSql(SqlDatabase* database,
   return status.ok() ? std::move(result) : status;
 }
 
-// A job whose answer is what the last call of `work` has returned.
+// A job that passes the result of the last call of `work` to `done`.
 template <typename Result>
 std::pair<SqlWork, SqlDatabase::StatusCallback> Returning(
     std::function<absl::StatusOr<Result>(SqlTransaction&)> work,
@@ -144,11 +145,11 @@ std::pair<SqlWork, SqlDatabase::StatusCallback> Returning(
           }};
 }
 
-// How many rows of a page are asked for, so that it is known whether there are more.
+// One row more than the page holds shows whether another page follows.
 inline int64_t RowsOfPage(int limit) { return int64_t{limit} + 1; }
 
-// The records of a page. A damaged row is left out: who asks for it hears so. `name_column` is that
-// by which pages follow each other.
+// The records of a page. A damaged row is left out; reading it by name gives the error. Pages are
+// ordered by `name_column`.
 template <typename Page, typename Read>
 Page ReadPage(const SqlRows& rows, int limit, size_t name_column, Read read) {
   Page page;

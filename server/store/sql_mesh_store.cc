@@ -24,7 +24,7 @@ absl::StatusOr<MeshRecord> FindRow(SqlTransaction& transaction, const std::strin
   return ReadMesh(rows, 0);
 }
 
-// No session of it is begun until the transaction's end.
+// Also locks the mesh, so no session of it is created until the transaction ends.
 absl::Status CheckNoSessionHasMesh(SqlTransaction& transaction, const std::string& sha256) {
   TF_RETURN_IF_ERROR(
       transaction.Run("SELECT 1 FROM meshes WHERE sha256 = $1 FOR UPDATE", {sha256}));
@@ -34,7 +34,7 @@ absl::Status CheckNoSessionHasMesh(SqlTransaction& transaction, const std::strin
   return sessions == 0 ? absl::OkStatus() : MeshHasSessions(sessions);
 }
 
-// A mesh that arrives as its blob: the text of its shape, then the payload.
+// Collects a mesh from the pieces of its blob: the text of its shape, then the payload.
 class ArrivingMesh {
  public:
   explicit ArrivingMesh(const MeshRecord& record)
@@ -58,7 +58,7 @@ class ArrivingMesh {
   const std::string text_;
   MeshPayload payload_;
   const std::string sha256_;
-  std::string head_;  // the first bytes, until the text is whole
+  std::string head_;  // the first bytes, until the text is complete
   int64_t offset_ = 0;
 };
 

@@ -15,10 +15,10 @@
 namespace tissueform {
 namespace {
 
-// Random, so that an etag never comes again, without a counter that every write would have to keep.
+// Random, so etags never repeat and no counter has to be stored.
 std::string NewEtag() { return RandomId(); }
 
-// What decides about a write; nobody else changes it until the transaction's end.
+// The row's state that a write is checked against, locked until the transaction ends.
 struct LockedState {
   int64_t key = 0;
   std::string etag;
@@ -41,7 +41,7 @@ absl::StatusOr<LockedState> LockState(SqlTransaction& transaction, const std::st
                      rows.Integer(0, 3), rows.Integer(0, 4),           rows.Integer(0, 5)};
 }
 
-// The mesh that it is made from is not deleted until the transaction's end. Errors: NotFound.
+// Locks the session's mesh against deletion until the transaction ends. Errors: NotFound.
 absl::Status LockMeshOf(SqlTransaction& transaction, const SessionRecord& record) {
   TF_ASSIGN_OR_RETURN(const SqlRows rows,
                       transaction.Query("SELECT 1 FROM meshes WHERE sha256 = $1 FOR KEY SHARE",
@@ -49,8 +49,8 @@ absl::Status LockMeshOf(SqlTransaction& transaction, const SessionRecord& record
   return rows.empty() ? NoMesh(record.mesh_sha256) : absl::OkStatus();
 }
 
-// Under the record's epoch, or one that is given (kFreshEpoch): returns it. Its mesh cannot be
-// deleted any longer, where it is there. Errors: AlreadyExists.
+// Returns the epoch: the record's, or a new one for kFreshEpoch. From then on the mesh, if stored,
+// cannot be deleted. Errors: AlreadyExists.
 absl::StatusOr<int64_t> Insert(SqlTransaction& transaction, const SessionRecord& record) {
   const SealedSession sealed(record);
   TF_ASSIGN_OR_RETURN(
@@ -60,7 +60,7 @@ absl::StatusOr<int64_t> Insert(SqlTransaction& transaction, const SessionRecord&
           "meshes WHERE sha256 = $4)) ON CONFLICT (id) DO NOTHING RETURNING key",
           {record.id, record.owner, SqlBytes{sealed.record}, record.mesh_sha256}));
   if (rows.empty()) return SessionExists(record.id);
-  // Only now, that the id is free: whoever held a session of it before has got its epoch by now.
+  // After the id was found free: an earlier holder of a session of this id has a lower epoch.
   static_assert(kFreshEpoch == 0);
   TF_ASSIGN_OR_RETURN(
       const SqlRows state,
@@ -124,7 +124,7 @@ absl::Status CommitPoseRow(SqlTransaction& transaction, const std::string& id, i
   TF_RETURN_IF_ERROR(CheckSessionWrite(id, "", epoch, state.etag, state.epoch));
   TF_RETURN_IF_ERROR(
       CheckPoseCount(id, static_cast<size_t>(count), static_cast<size_t>(state.handles)));
-  // It has come, or changed, between the two statements.
+  // The session was created or changed between the two statements.
   return transaction.Run(
       "UPDATE session_states SET poses = $1, epoch = $2, last_used_s = GREATEST(last_used_s, $3) "
       "WHERE key = $4",
@@ -144,7 +144,7 @@ void SqlSessionStore::Create(SessionRecord record, int64_t epoch, RecordCallback
   auto [work, answer] = Returning<SessionRecord>(
       [record = std::move(record),
        shared = database_->shared()](SqlTransaction& transaction) -> absl::StatusOr<SessionRecord> {
-        // Another server may have deleted it since it was looked at.
+        // Another server may have deleted the mesh since it was checked.
         if (shared) TF_RETURN_IF_ERROR(LockMeshOf(transaction, record));
         SessionRecord kept = record;
         TF_ASSIGN_OR_RETURN(kept.epoch, Insert(transaction, record));
@@ -172,7 +172,7 @@ void SqlSessionStore::Update(SessionRecord record, int64_t epoch, RecordCallback
       [record = std::move(record), epoch,
        now_s = clock_()](SqlTransaction& transaction) -> absl::StatusOr<SessionRecord> {
         TF_ASSIGN_OR_RETURN(const LockedState state, LockState(transaction, record.id));
-        // A record without an etag was not read from here.
+        // A record without an etag was not read from this store.
         TF_RETURN_IF_ERROR(CheckSessionWrite(record.id, record.etag.empty() ? "none" : record.etag,
                                              epoch, state.etag, state.epoch));
         SessionRecord next = record;
@@ -189,8 +189,8 @@ void SqlSessionStore::Update(SessionRecord record, int64_t epoch, RecordCallback
 
 void SqlSessionStore::CommitPoses(const std::string& id, std::vector<HandlePose> poses,
                                   int64_t epoch, StatusCallback done) {
-  // Repeatable: under one epoch nobody else writes meanwhile, and later calls for this session
-  // wait, so the same poses once more are the newest still.
+  // Repeatable: only the holder of the epoch writes, and later calls for this session wait, so
+  // these poses are still the newest at a retry.
   database_->Submit(
       id,
       {.work =
@@ -227,7 +227,7 @@ void SqlSessionStore::List(const ListRequest& request, PageCallback done) {
 }
 
 void SqlSessionStore::Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) {
-  // Rows are locked by key, rising, so that two servers do not wait for each other.
+  // Rows are locked in order of their keys, so two servers cannot deadlock.
   database_->Submit(
       "",
       {.work =

@@ -13,12 +13,11 @@
 
 namespace tissueform {
 
-// Sessions as rows (store_schema.h). What is asked of one session is done in the order of the
-// calls.
+// Sessions as rows (store_schema.h). Calls for one session are carried out in order.
 //
-// Where servers share the database, the epoch that a write is refused by is that of the session's
-// lease (postgres_store/session_leases.h): a server that takes a session over raises it, so nobody
-// who held it before writes any more. Nobody has a higher one than the row's, so "not older" is
+// Where servers share the database, a write is checked against the epoch of the session's lease
+// (postgres_store/session_leases.h). A server that takes a session over raises it, so writes of the
+// previous holder are refused. No server has a higher epoch than the row, so "not older" means
 // "mine".
 class SqlSessionStore : public SessionStore {
  public:
@@ -43,8 +42,8 @@ class SqlSessionStore : public SessionStore {
   const UnixClock clock_;
 };
 
-// Keeps sealed poses, `count` of them, as CommitPoses does: in one statement where they may be
-// kept, which is the rule; why not is asked afterwards.
+// Stores `count` sealed poses as CommitPoses does, normally in one statement; others find the
+// reason if that is refused.
 absl::Status CommitPoseRow(SqlTransaction& transaction, const std::string& id, int64_t count,
                            const std::string& poses, int64_t epoch, int64_t now_s);
 

@@ -3,8 +3,6 @@
 
 #include "server/store/sql_stores.h"
 
-#include <cerrno>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -19,14 +17,11 @@
 namespace tissueform {
 namespace {
 
-// A private folder below the system's temporary one, which goes with this object.
+// A private folder in the system's temporary folder; deleted with this object.
 class TemporaryFolder {
  public:
   static absl::StatusOr<std::unique_ptr<TemporaryFolder>> Make() {
-    std::error_code error;
-    const std::filesystem::path parent = std::filesystem::temp_directory_path(error);
-    std::string path = (error ? "/tmp" : parent.string()) + "/tissueform-memory-XXXXXX";
-    if (mkdtemp(path.data()) == nullptr) return FileError(errno, "cannot make", path);
+    TF_ASSIGN_OR_RETURN(std::string path, MakeTemporaryFolder("tissueform-memory"));
     return std::unique_ptr<TemporaryFolder>(new TemporaryFolder(std::move(path)));
   }
   ~TemporaryFolder() {
@@ -44,7 +39,7 @@ class TemporaryFolder {
   const std::string path_;
 };
 
-// In the order in which they need each other.
+// Ordered by dependency.
 struct InMemoryParts {
   InMemoryParts(std::unique_ptr<TemporaryFolder> its_folder, std::unique_ptr<BlobStore> its_files,
                 std::unique_ptr<Database> opened)

@@ -18,7 +18,7 @@
 
 namespace tissueform {
 
-// The stores over a driver. Who derives from it owns the driver.
+// The stores over a driver, which derived classes own.
 class SqlStores : public Stores {
  public:
   SessionStore& sessions() override { return sessions_; }
@@ -31,7 +31,7 @@ class SqlStores : public Stores {
   const DurationHistogram* latency() const override { return database_.latency(); }
 
  protected:
-  // `database` and `blobs` are used by calls only, and must outlive these.
+  // `database` and `blobs` are not used by the constructor and destructor; they must outlive calls.
   SqlStores(SqlDatabase* database, SqlBlobs* blobs, std::unique_ptr<UploadStore> uploads,
             UnixClock clock)
       : database_(*database),
@@ -52,8 +52,8 @@ class SqlStores : public Stores {
   SqlCaseStore cases_;
 };
 
-// Of a server that keeps nothing: an SQLite database in memory, and a temporary folder for meshes,
-// positions, cases and partial uploads, which goes with it.
+// For --in-memory: an SQLite database in memory and temporary folders for meshes, positions, cases
+// and partial uploads, which are deleted with it.
 // Errors: those of UploadStore::OpenTemporary.
 absl::StatusOr<std::unique_ptr<Stores>> OpenInMemoryStores(UnixClock clock = SystemUnixSeconds,
                                                            UploadLimits limits = {});

@@ -13,9 +13,9 @@
 
 namespace tissueform {
 
-// Blobs as files beside an SQLite database. A blob is written on the caller's thread before its row
-// and removed on the database's thread after the last row that claims it: a file that no row claims
-// is the worst that a crash leaves.
+// Blobs as files next to an SQLite database. A file is written on the caller's thread before its
+// row and removed on the database's thread after its last row, so a crash leaves at worst a file
+// without a row.
 class SqliteBlobs final : public SqlBlobs {
  public:
   // Both must outlive it.
@@ -26,7 +26,7 @@ class SqliteBlobs final : public SqlBlobs {
   absl::StatusOr<std::unique_ptr<Incoming>> Receive() override;
   absl::Status Read(const FindClaim& find, const Sink& sink) override;
   absl::StatusOr<OpenFile> Open(const FindClaim& find) override;
-  // Rows change on one thread, and a file goes after them.
+  // One thread changes rows, and files are removed after them: there is nothing to lock.
   absl::Status Lock(SqlTransaction& /*transaction*/, const std::string& /*sha256*/) override {
     return absl::OkStatus();
   }
@@ -38,8 +38,8 @@ class SqliteBlobs final : public SqlBlobs {
 
   absl::Status Claim(const std::string& sha256, absl::StatusOr<BlobStore::Pin> pin,
                      const SqlWork& claim);
-  // Calls `use` for the blob of a row. One that is not there is damage only when its row still is
-  // after so many looks: between the two others may delete both and make them again.
+  // Calls `use` for the blob of a row. A missing file is damage only if it is missing several
+  // times: another thread may delete row and file between the two reads.
   absl::Status UseClaimed(const FindClaim& find,
                           const std::function<absl::Status(const BlobClaim&)>& use);
 

@@ -76,7 +76,7 @@ SqliteDatabase::SqliteDatabase(std::unique_ptr<Database> in_memory)
 
 SqliteDatabase::~SqliteDatabase() {
   MutexLock lock(mutex_);
-  ending_ = true;  // the commit thread, which ends last, takes reads of its answers
+  ending_ = true;  // callbacks of the commit thread, which ends last, must not use reads_ any more
 }
 
 absl::Status SqliteDatabase::Run(const SqlJob& job) {

@@ -19,17 +19,17 @@
 
 namespace tissueform {
 
-// The driver for SQLite: one thread writes, in the order of the calls, and commits together what
-// waits; reads do not wait for it, but for those of a key that is being written.
+// The driver for SQLite. One thread writes, in call order, and commits waiting jobs together. Reads
+// do not wait for it, except reads of a key with unfinished writes.
 //
-// Answers of Submit come on that thread, or on one that reads; in memory where they are submitted.
+// Submit calls `done` on that thread or on the reading thread; in memory, before it returns.
 class SqliteDatabase final : public SqlDatabase {
  public:
   // As CommitThread's.
   SqliteDatabase(std::unique_ptr<Database> database, std::unique_ptr<Database> reader,
                  std::function<absl::Status()> check);
   explicit SqliteDatabase(std::unique_ptr<Database> in_memory);
-  // Answers all that was submitted, also by those answers.
+  // Finishes all submitted jobs, including those that their callbacks submit.
   ~SqliteDatabase() override;
 
   absl::Status Run(const SqlJob& job) override;
@@ -43,20 +43,20 @@ class SqliteDatabase final : public SqlDatabase {
   CommitThread& thread() { return thread_; }
 
  private:
-  // Has it run beside the commit thread. False where it must not.
+  // Runs it on the reading thread. False if it must wait for the commit thread.
   bool SubmitRead(const std::string& key, const SqlJob& job, const StatusCallback& done)
       ABSL_LOCKS_EXCLUDED(mutex_);
   void SubmitWrite(const std::string& key, SqlJob job, StatusCallback done);
 
   Mutex mutex_;
-  // How many writes of a key are not answered yet.
+  // Number of unfinished writes by key.
   std::map<std::string, int> written_ ABSL_GUARDED_BY(mutex_);
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
   CommitThread thread_;
   OrderedJobs reads_{1};  // last: its jobs use the others
 };
 
-// What SqlJob::work becomes for a connection.
+// Adapts SqlJob::work to a connection.
 std::function<absl::Status(Database&)> OnSqlite(SqlWork work);
 
 }  // namespace tissueform

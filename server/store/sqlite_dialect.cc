@@ -8,20 +8,21 @@
 namespace tissueform {
 
 std::string ToSqlite(absl::string_view sql) {
-  // Where several could begin at one place the longest is taken.
+  // If several replacements start at one place, the longest wins.
   return absl::StrReplaceAll(
       sql, {
-               // Only one transaction writes: rows need no locks, and no epochs are given.
+               // Only one transaction writes at a time, so rows need no locks. A server with a
+               // store of its own needs no new epochs.
                {" FOR UPDATE OF session_states", ""},
                {" FOR UPDATE", ""},
                {" FOR KEY SHARE", ""},
                {"nextval('session_epochs')", "0"},
-               // A parameter has the type of what is bound to it.
+               // A parameter has the type of its value.
                {"::bigint", ""},
                {"$", "?"},
                {"GREATEST(", "max("},
                {"encode(convert_to(owner, 'UTF8'), 'hex')", "lower(hex(owner))"},
-               // SqlNames leaves out what JSON would escape.
+               // SqlNames contains no character that JSON would escape.
                {"= ANY (string_to_array($", "IN (SELECT value FROM json_each('[\"' || replace(?"},
                {", chr(31)))", ", char(31), '\",\"') || '\"]'))"},
            });

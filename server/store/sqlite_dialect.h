@@ -9,7 +9,7 @@
 
 namespace tissueform {
 
-// A statement of sql_database.h in SQLite's words.
+// Translates a statement of sql_database.h for SQLite.
 std::string ToSqlite(absl::string_view sql);
 
 }  // namespace tissueform

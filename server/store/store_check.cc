@@ -27,7 +27,7 @@
 namespace tissueform {
 namespace {
 
-// With the key first, and sessions that have lost their state, too.
+// With the key first; includes sessions without a state row.
 constexpr char kSessions[] =
     "SELECT sessions.key, id, owner, record, etag, epoch, handles, poses, created_s, last_used_s "
     "FROM sessions LEFT JOIN session_states ON session_states.key = sessions.key";

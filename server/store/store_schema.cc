@@ -74,7 +74,7 @@ absl::StatusOr<int64_t> Pragma(Database& database, const char* sql) {
   return row ? query.Integer(0) : 0;
 }
 
-// What sessions of version 5 are made from. Damaged ones are set aside later (store_check.h).
+// Fills the column for sessions of version 5. store_check.h sets damaged ones aside later.
 absl::Status FillMeshesOfSessions(Database& database) {
   std::vector<std::pair<int64_t, std::string>> meshes;
   {
@@ -120,7 +120,7 @@ absl::Status Change(Database& database, int64_t version, int64_t now_s) {
   return database.Execute("COMMIT");
 }
 
-// With the key.
+// Including the key.
 int CountColumns(const StoredTable& table) {
   return static_cast<int>(absl::string_view(table.types).size()) + 1;
 }
@@ -196,7 +196,7 @@ absl::Status CopyReadableRows(Database& damaged, Database& fresh) {
   absl::Cleanup roll_back = [&fresh] {
     if (fresh.in_transaction()) fresh.Execute("ROLLBACK").IgnoreError();
   };
-  // A statement is known by its address: they live as long as the databases' use of them.
+  // Database caches statements by address, so the texts must outlive their use.
   std::vector<std::array<std::string, 3>> statements;
   statements.reserve(kStoredTables.size());
   for (const StoredTable& table : kStoredTables) {

@@ -16,9 +16,8 @@ namespace tissueform {
 // The tables of a store. A record is its sealed bytes (store_records.h); beside it stand only what
 // rows are found by and what changes often.
 //
-//   sessions        id, owner, record without its poses, mesh: that it is made from, which cannot
-//   be
-//                   deleted meanwhile; null where it is not there
+//   sessions        id, owner, record without its poses; mesh: its mesh, which cannot be
+//                   deleted while the session exists (null: the mesh is not stored)
 //   session_states  what a session's writes change: etag, epoch, poses, times. A row of its own, so
 //                   that the commit of a pose writes one small page and not the record.
 //   meshes          sha256, record, last_used_s; the payload is the blob sha256
@@ -27,20 +26,20 @@ namespace tissueform {
 //   cases           sha256, owner, record, last_used_s; the file is the blob sha256
 //   shares, follow_links, mesh_rights
 //                   name, record: who may do what (server/store/access_store)
-//   exports         name, record, version: what is to go to the PACS (server/exports); version 0 is
-//                   that of a server that did not keep it
+//   exports         name, record, version: what is to go to the PACS (server/exports); version 0:
+//                   written before version 6
 //
 // Version 1 had neither times nor predictions, version 2 no cases, version 3 one owner a case, and
 // nobody had a right; version 4 had no exports, version 5 no meshes of sessions.
 inline constexpr int64_t kSchemaVersion = 6;
 
-// A table, for who copies rows as they are.
+// Describes a table for code that copies rows.
 struct StoredTable {
   const char* name;
-  const char* columns;  // all but `key`, by which rows are told apart
+  const char* columns;  // all but the primary key `key`
   const char* types;    // of each column: "i" integer, "t" text, "b" bytes
 };
-// In the order in which rows need each other.
+// Referenced tables come before referencing ones.
 inline constexpr std::array<StoredTable, 9> kStoredTables = {{
     {"meshes", "sha256, record, last_used_s", "tbi"},
     {"sessions", "id, owner, record, mesh", "ttbt"},

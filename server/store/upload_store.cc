@@ -132,10 +132,7 @@ absl::StatusOr<std::unique_ptr<UploadStore>> UploadStore::Open(std::string folde
 }
 
 absl::StatusOr<std::unique_ptr<UploadStore>> UploadStore::OpenTemporary(UploadLimits limits) {
-  std::error_code error;
-  const std::filesystem::path parent = std::filesystem::temp_directory_path(error);
-  std::string folder = (error ? "/tmp" : parent.string()) + "/tissueform-uploads-XXXXXX";
-  if (mkdtemp(folder.data()) == nullptr) return FileError(errno, "cannot make", folder);
+  TF_ASSIGN_OR_RETURN(std::string folder, MakeTemporaryFolder("tissueform-uploads"));
   return std::unique_ptr<UploadStore>(
       new UploadStore(std::move(folder), limits, /*durable=*/false));
 }

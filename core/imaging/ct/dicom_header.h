@@ -32,7 +32,7 @@ enum class DicomKind {
 
 // The header of one image: of a file, or of a frame of a multi-frame file. Texts and UIDs, except
 // the modality, are for comparison only, never in a message: they may name the patient. Their bytes
-// are the file's, whatever its character set. series_description stays empty: nothing here needs
+// are the file's, undecoded. series_description stays empty: nothing here needs
 // it. The class of a CT slice that names none is kCtImageClass.
 struct DicomHeader : ImageHeader {
   std::string path;     // never in a message: it may name the patient

@@ -32,7 +32,7 @@ struct SeriesChoice {
 // does not choose between patients, studies, scans within one series and consecutive parts of a
 // scan, nor where Enhanced CT is among them, which it does not measure.
 //
-// Errors: InvalidArgument when there is none, with what there is instead; when there are several
+// Errors: InvalidArgument when the folder has none, listing what it has; when there are several
 // and the rule chooses none, with the largest of them, what the rule finds and how to choose; when
 // what was asked for is not there, holds no CT slice, or holds what may be slices that are not read
 // (multi-frame, cut off).

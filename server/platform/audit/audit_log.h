@@ -19,7 +19,7 @@
 namespace tissueform {
 
 // Audit messages wait in a queue of limited length for a thread that gives them to a sink; callers
-// do not wait. A caller that will have a message reserves a place first. There is none while the
+// do not wait. A caller that will have a message reserves a place first. Reserving fails while the
 // sink takes nothing.
 //
 // Messages are as AuditSink::Take describes them. Thread-safe.

@@ -49,7 +49,7 @@ std::optional<Collector> ParseCollector(absl::string_view target) {
 
 std::string CheckTarget(const std::string& target) {
   if (target == kJournal || ParseCollector(target).has_value()) return "";
-  return "--audit: give journal or syslog://HOST:PORT";
+  return "give journal or syslog://HOST:PORT";
 }
 
 }  // namespace
@@ -86,7 +86,9 @@ absl::StatusOr<std::unique_ptr<AuditSink>> OpenAuditSink(const AuditOptions& opt
                                                          const std::string& folder) {
   if (options.target == kJournal) return JournalSink::Open(program, options.journal_socket);
   const std::optional<Collector> collector = ParseCollector(options.target);
-  if (!collector.has_value()) return absl::InvalidArgumentError(CheckTarget(options.target));
+  if (!collector.has_value()) {
+    return absl::InvalidArgumentError(absl::StrCat("--audit: ", CheckTarget(options.target)));
+  }
   const std::string& place = options.buffer_folder.empty() ? folder : options.buffer_folder;
   if (place.empty()) {
     return absl::InvalidArgumentError("give --audit-buffer DIR: this server has no data folder");

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cstdlib>
 #include <fcntl.h>
 #include <filesystem>
 #include <unistd.h>
@@ -129,6 +130,14 @@ absl::Status MakeFolder(const std::string& path) {
   if (std::filesystem::is_directory(path, ignored)) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat("cannot create the folder ", path, ": a file has this name; move it"));
+}
+
+absl::StatusOr<std::string> MakeTemporaryFolder(absl::string_view name) {
+  std::error_code error;
+  const std::filesystem::path parent = std::filesystem::temp_directory_path(error);
+  std::string path = absl::StrCat(error ? "/tmp" : parent.string(), "/", name, "-XXXXXX");
+  if (mkdtemp(path.data()) == nullptr) return FileError(errno, "cannot make", path);
+  return path;
 }
 
 absl::Status SyncFolder(const std::string& path) {

@@ -54,6 +54,10 @@ class OpenFile {
 // been synced.
 absl::Status MakeFolder(const std::string& path);
 
+// Makes a new private folder (0700) "NAME-XXXXXX" in the system's temporary folder; returns its
+// path.
+absl::StatusOr<std::string> MakeTemporaryFolder(absl::string_view name);
+
 // The names in a folder are on the disk when it returns.
 absl::Status SyncFolder(const std::string& path);
 

@@ -46,12 +46,12 @@ absl::Status CopyBlob(SqlStores* from, const BlobClaim& claim, SqlStores* to) {
   };
   TF_RETURN_IF_ERROR(
       from->blobs().Read(begin, [&copy](absl::string_view piece) { return copy->Append(piece); }));
-  // The rows that claim it follow with their tables.
+  // Its rows are copied later, with their tables.
   return copy->Keep(claim.sha256, [](SqlTransaction&) { return absl::OkStatus(); });
 }
 
-// Blobs that rows of this selection claim. `select` names rows greater than $1 in order, $2 of
-// them; `name_column` is that by which they follow each other.
+// Copies the blobs claimed by the rows of `select`, which returns up to $2 rows with names greater
+// than $1, ordered by `name_column`.
 template <typename Read>
 absl::Status CopyBlobs(SqlStores* from, SqlStores* to, const char* select, size_t name_column,
                        Read read) {
@@ -75,12 +75,12 @@ absl::Status CopyAllBlobs(SqlStores* from, SqlStores* to) {
       from, to, TF_SELECT_MESHES "WHERE sha256 > $1 ORDER BY sha256 LIMIT $2", 0, ReadMesh));
   TF_RETURN_IF_ERROR(CopyBlobs(from, to, TF_SELECT_PREDICTIONS "WHERE id > $1 ORDER BY id LIMIT $2",
                                0, ReadPrediction));
-  // Those of one name, which a page may part, have one blob.
+  // Cases with the same name share one blob, so a page may end between them.
   return CopyBlobs(from, to, TF_SELECT_CASES "WHERE sha256 > $1 ORDER BY sha256 LIMIT $2", 0,
                    ReadCase);
 }
 
-// How a table is read page by page, and written.
+// Statements that read a table in pages and write it.
 struct CopyStatements {
   explicit CopyStatements(const StoredTable& table)
       : select(absl::StrCat("SELECT key, ", table.columns, " FROM ", table.name,
@@ -91,7 +91,7 @@ struct CopyStatements {
     const auto columns = absl::string_view(table.types).size();
     for (size_t column = 0; column < columns; ++column) {
       const std::string parameter = absl::StrCat("$", column + 2);
-      // The mesh of a session need not be there any longer.
+      // The mesh of a session may have been deleted.
       absl::StrAppend(
           &insert, ", ",
           of_sessions && column + 1 == columns
@@ -105,7 +105,7 @@ struct CopyStatements {
   std::string insert;
 };
 
-// They live for good: SQLite's driver knows them by their addresses.
+// Never freed: SQLite's driver caches statements by address.
 const CopyStatements& StatementsOf(const StoredTable& table) {
   static const auto* const all = [] {
     auto* statements = new std::map<absl::string_view, CopyStatements>;
@@ -134,7 +134,7 @@ std::vector<SqlValue> ValuesOf(const SqlRows& rows, size_t row, absl::string_vie
   return values;
 }
 
-// Returns how many rows there are.
+// Returns the number of rows.
 absl::StatusOr<int64_t> CopyTable(SqlStores* from, const StoredTable& table, PostgresPool* to) {
   const CopyStatements& statements = StatementsOf(table);
   int64_t count = 0;
@@ -158,11 +158,11 @@ absl::StatusOr<int64_t> CopyTable(SqlStores* from, const StoredTable& table, Pos
   }
 }
 
-// The next key and the next epoch are greater than all that were copied.
+// Sets the sequences above all copied keys and epochs.
 absl::Status GoOnCounting(PostgresPool* pool) {
   return pool->Run([](PostgresTransaction& transaction) -> absl::Status {
     for (const StoredTable& table : kStoredTables) {
-      // Its key is that of its session.
+      // Its key is the session's, without a sequence.
       if (table.name == absl::string_view("session_states")) continue;
       TF_RETURN_IF_ERROR(transaction.Execute(absl::StrCat("SELECT setval(pg_get_serial_sequence('",
                                                           table.name, "', 'key'), max(key)) FROM ",

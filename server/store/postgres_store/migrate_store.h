@@ -24,7 +24,8 @@ struct MigrationSummary {
 // Copies all that one server has kept (a DurableStore, which has checked it) into the empty store
 // of several, table by table: with ids, etags, epochs and times, so that clients go on with what
 // they have. Every blob is read with its digest. Meshes that have not arrived in full stay behind:
-// their clients send them anew. `from` stays as it is, and nobody else may use it meanwhile.
+// their clients upload them again. `from` is not changed; no other process may use it during the
+// copy.
 //
 // Errors: FailedPrecondition (there is something in `to`), DataLoss (a blob of `from` is damaged),
 // or those of the stores. After an error `to` holds a part: empty its database, and begin anew.

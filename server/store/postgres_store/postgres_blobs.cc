@@ -29,7 +29,7 @@ absl::Status BadBlob(const std::string& sha256, absl::string_view why) {
   return Damaged(absl::StrCat("blob ", sha256), why);
 }
 
-// The row of a blob, which is locked by that; its key.
+// Writes the row of a blob, which locks it; returns its key.
 absl::StatusOr<int64_t> PutBlobRow(SqlTransaction& transaction, const std::string& sha256,
                                    int64_t bytes) {
   TF_ASSIGN_OR_RETURN(
@@ -51,7 +51,7 @@ absl::StatusOr<bool> HasAllPieces(SqlTransaction& transaction, int64_t key, int6
 
 // Calls `sink` for all bytes in order, then checks the digest. REQUIRES: ReadOneMoment, and its
 // claim was read in this transaction. Errors: DataLoss (it is not `bytes` long; bytes have another
-// SHA-256), after whatever was given; those of `sink`.
+// SHA-256; `sink` may have had some of them), and those of `sink`.
 absl::Status ReadPieces(SqlTransaction& transaction, const BlobClaim& claim, const Sink& sink) {
   const auto& [sha256, bytes, what] = claim;
   Sha256 digest;

@@ -18,11 +18,10 @@
 
 namespace tissueform {
 
-// Blobs as rows of 1 MiB. A blob and the row that claims it are written in one transaction, and go
-// in one: there are none that nobody claims. Whoever writes or removes a claim has locked its blob
-// before, so that these take turns.
+// Blobs as rows of 1 MiB. A blob and the row that claims it are written in one transaction and
+// deleted in one, so every blob has a claim. Writing or removing a claim locks the blob first.
 //
-// A damaged blob that is set aside stays under the name "damaged KEY SHA-256".
+// A damaged blob that is set aside is kept under the name "damaged KEY SHA-256".
 class PostgresBlobs final : public SqlBlobs {
  public:
   static constexpr int64_t kPieceBytes = int64_t{1} << 20;
@@ -32,10 +31,10 @@ class PostgresBlobs final : public SqlBlobs {
 
   absl::Status Put(const std::string& sha256, const std::vector<absl::string_view>& parts,
                    const SqlWork& claim) override;
-  // In a nameless file until it is kept.
+  // In an unlinked temporary file until Keep.
   absl::StatusOr<std::unique_ptr<Incoming>> Receive() override;
   absl::Status Read(const FindClaim& find, const Sink& sink) override;
-  // A nameless copy.
+  // An unlinked temporary copy.
   absl::StatusOr<OpenFile> Open(const FindClaim& find) override;
   absl::Status Lock(SqlTransaction& transaction, const std::string& sha256) override;
   absl::Status Remove(const Release& release) override;
@@ -43,7 +42,7 @@ class PostgresBlobs final : public SqlBlobs {
 
  private:
   class IncomingFile;
-  // `size` bytes from `offset` on; they are there.
+  // Returns `size` bytes from `offset` on. REQUIRES: the blob has them.
   using Source = std::function<absl::StatusOr<std::string>(int64_t offset, int64_t size)>;
 
   absl::Status PutFrom(const std::string& sha256, int64_t bytes, const Source& source,

@@ -18,7 +18,7 @@ PostgresPool::Idempotent IsIdempotent(const SqlJob& job) {
 
 }  // namespace
 
-// Half of the connections for each: reads and writes of blobs find some, too.
+// Half of the connections for each, so that blob transfers also get some.
 PostgresDatabase::PostgresDatabase(PostgresPool* pool)
     : pool_(pool),
       jobs_((pool->options().max_connections + 1) / 2),

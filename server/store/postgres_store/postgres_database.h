@@ -13,9 +13,9 @@
 
 namespace tissueform {
 
-// The driver for PostgreSQL, which several servers share. A call is answered after
-// PostgresOptions::patience at the latest, UNAVAILABLE where the database was not there. Answers
-// come on this object's threads.
+// The driver for PostgreSQL, which several servers share. A call ends within
+// PostgresOptions::patience, with Unavailable if the database cannot be reached. Submit and Peek
+// call `done` on threads of this object.
 class PostgresDatabase final : public SqlDatabase {
  public:
   // `pool` must outlive it.
