@@ -14,7 +14,7 @@
 #include "core/base/mutex.h"
 #include "server/access/access.h"
 #include "server/access/access_options.h"
-#include "server/store/access_store/access_store.h"
+#include "server/store/access_store.h"
 
 namespace tissueform {
 

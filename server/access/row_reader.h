@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 
-#include "server/store/access_store/access_store.h"
+#include "server/store/access_store.h"
 #include "server/store/case_store.h"
 #include "server/store/prediction_store.h"
 #include "server/store/session_record.h"

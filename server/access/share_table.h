@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/store/access_store/access_store.h"
+#include "server/store/access_store.h"
 
 namespace tissueform {
 

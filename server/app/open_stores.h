@@ -10,7 +10,7 @@
 
 #include "server/app/server_options.h"
 #include "server/exports/export_store.h"
-#include "server/store/access_store/access_store.h"
+#include "server/store/access_store.h"
 #include "server/store/postgres_store/postgres_stores.h"
 #include "server/store/stores.h"
 

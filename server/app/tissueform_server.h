@@ -45,7 +45,7 @@
 #include "server/session/mesh_uploads.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
-#include "server/store/access_store/access_store.h"
+#include "server/store/access_store.h"
 #include "server/store/stores.h"
 #include "server/telemetry/telemetry.h"
 

@@ -13,10 +13,10 @@
 
 #include "core/base/mutex.h"
 #include "server/access/row_reader.h"
-#include "server/store/access_store/sql_access_store.h"
 #include "server/store/postgres_store/postgres_blobs.h"
 #include "server/store/postgres_store/postgres_database.h"
 #include "server/store/postgres_store/postgres_pool.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/sql_case_store.h"
 #include "server/store/sql_prediction_store.h"
 #include "server/store/sql_session_store.h"

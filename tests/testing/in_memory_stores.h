@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/sql_case_store.h"
 #include "server/store/sql_mesh_store.h"
 #include "server/store/sql_session_store.h"

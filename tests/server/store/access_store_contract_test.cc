@@ -9,7 +9,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/sql_access_store.h"
 #include "tests/server/store/stores_case.h"
 #include "tests/testing/status_matchers.h"
 

@@ -22,7 +22,7 @@
 #include "core/mesh/payload/sha256.h"
 #include "server/exports/export_store.h"
 #include "server/platform/storage/database.h"
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/store_records.h"
 #include "server/store/store_schema.h"
 #include "tests/server/store/store_samples.h"
@@ -318,7 +318,8 @@ TEST_F(DurableStoreTest, ADamagedPageCostsItsRowsOnly) {
   const std::string file = path_ + "/tissueform.db";
   const std::string bytes = ReadFile(file);
   constexpr size_t kPage = 4096;
-  const size_t at = bytes.find("project 60") / kPage * kPage;
+  // In the record, after its length: the indexes hold the text, too.
+  const size_t at = bytes.find("\nproject 60") / kPage * kPage;
   ASSERT_GT(at, 0U);
   std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
   stream.seekp(static_cast<std::streamoff>(at)) << std::string(kPage, '\x55');

@@ -11,7 +11,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/sql_access_store.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"

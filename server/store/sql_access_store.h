@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/store/access_store/access_store.h"
+#include "server/store/access_store.h"
 #include "server/store/sql_database.h"
 
 namespace tissueform {

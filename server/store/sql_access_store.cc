@@ -1,13 +1,15 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/sql_access_store.h"
 
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/status_macros.h"
-#include "server/store/access_store/access_rows.h"
+#include "server/store/access_rows.h"
+#include "server/store/store_index.h"
 #include "server/store/store_records.h"
 
 namespace tissueform {
@@ -19,17 +21,21 @@ struct Statements {
   const char* erase;
   const char* put;
 };
-#define TF_ACCESS_STATEMENTS(table)                                                              \
+// Parameters of `put` are the key, the record, and the columns of IndexOf.
+#define TF_ACCESS_STATEMENTS(table, columns, parameters)                                         \
   {                                                                                              \
     "SELECT name, record FROM " table " ORDER BY name",                                          \
         "SELECT record FROM " table " WHERE name = $1", "DELETE FROM " table " WHERE name = $1", \
-        "INSERT INTO " table                                                                     \
-        " (name, record) VALUES ($1, $2) ON CONFLICT (name) "                                    \
-        "DO UPDATE SET record = excluded.record"                                                 \
+        "INSERT INTO " table " (name, record, " columns ") VALUES ($1, $2, " parameters          \
+        ") ON CONFLICT (name) DO UPDATE SET record = excluded.record"                            \
   }
-constexpr Statements kShares = TF_ACCESS_STATEMENTS("shares");
-constexpr Statements kLinks = TF_ACCESS_STATEMENTS("follow_links");
-constexpr Statements kMeshRights = TF_ACCESS_STATEMENTS("mesh_rights");
+constexpr Statements kShares =
+    TF_ACCESS_STATEMENTS("shares", "owner, resource, principal", "$3, $4, $5");
+// A link never changes, and neither do the bytes of a mesh.
+constexpr Statements kLinks =
+    TF_ACCESS_STATEMENTS("follow_links", "session, maker, expires_s", "$3, $4, $5");
+constexpr Statements kMeshRights =
+    TF_ACCESS_STATEMENTS("mesh_rights", "principal, sha256, bytes", "$3, $4, $5");
 #undef TF_ACCESS_STATEMENTS
 
 template <typename Row>
@@ -52,8 +58,11 @@ absl::Status ChangeRows(SqlTransaction& transaction, const Statements& statement
     TF_RETURN_IF_ERROR(transaction.Run(statements.erase, {KeyOf(row)}));
   }
   for (const Row& row : put) {
-    TF_RETURN_IF_ERROR(
-        transaction.Run(statements.put, {KeyOf(row), SqlBytes{Seal(SerializeRow(row))}}));
+    const std::string key = KeyOf(row);
+    const std::string record = Seal(SerializeRow(row));
+    std::vector<SqlValue> values = {key, SqlBytes{record}};
+    for (const SqlValue& value : IndexOf(row)) values.push_back(value);
+    TF_RETURN_IF_ERROR(transaction.Run(statements.put, values));
   }
   return absl::OkStatus();
 }
