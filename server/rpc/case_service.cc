@@ -101,36 +101,26 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
   return call;
 }
 
-grpc::ServerUnaryReactor* CaseService::Run(grpc::CallbackServerContext* context,
-                                           std::string_view method,
-                                           std::function<absl::Status(CallScope* scope)> work) {
-  return HandleUnaryCall(
-      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
-        pool_->Post(Lane::kStore,
-                    [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-        return absl::OkStatus();
-      });
-}
-
 grpc::ServerUnaryReactor* CaseService::GetCase(grpc::CallbackServerContext* context,
                                                const v1::GetCaseRequest* request,
                                                v1::Case* response) {
-  return Run(context, "CaseService.GetCase",
-             [=, this](CallScope* scope) { return Find(scope, *request, response); });
+  return HandleStoreCall(context, "CaseService.GetCase", gate_, pool_,
+                         [=, this](CallScope* scope) { return Find(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* CaseService::ListCases(grpc::CallbackServerContext* context,
                                                  const v1::ListCasesRequest* request,
                                                  v1::ListCasesResponse* response) {
-  return Run(context, "CaseService.ListCases",
-             [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
+  return HandleStoreCall(
+      context, "CaseService.ListCases", gate_, pool_,
+      [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
 }
 
 grpc::ServerUnaryReactor* CaseService::DeleteCase(grpc::CallbackServerContext* context,
                                                   const v1::DeleteCaseRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
-  return Run(context, "CaseService.DeleteCase",
-             [=, this](CallScope* scope) { return Remove(scope, *request); });
+  return HandleStoreCall(context, "CaseService.DeleteCase", gate_, pool_,
+                         [=, this](CallScope* scope) { return Remove(scope, *request); });
 }
 
 absl::Status CaseService::Find(CallScope* scope, const v1::GetCaseRequest& request,

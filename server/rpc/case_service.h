@@ -4,8 +4,6 @@
 #pragma once
 
 #include <atomic>
-#include <functional>
-#include <string_view>
 
 #include "absl/status/status.h"
 
@@ -40,10 +38,6 @@ class CaseService final : public v1::CaseService::CallbackService {
                                        google::protobuf::Empty* response) override;
 
  private:
-  // Finishes a call with what `work` says, which may block on the disk.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(CallScope* scope)> work);
-
   absl::Status Find(CallScope* scope, const v1::GetCaseRequest& request, v1::Case* response);
   absl::Status List(const v1::ListCasesRequest& request, const Principal& caller,
                     v1::ListCasesResponse* response);

@@ -3,8 +3,6 @@
 
 #pragma once
 
-#include <functional>
-#include <string_view>
 
 #include "absl/status/status.h"
 
@@ -54,10 +52,6 @@ class ExportService final : public v1::ExportService::CallbackService {
                                          google::protobuf::Empty* response) override;
 
  private:
-  // Finishes a call with what `work` says, which may block on the disk.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(CallScope* scope)> work);
-
   // The export, once its caller may have it.
   absl::StatusOr<ExportRecord> Allowed(CallScope* scope, const std::string& name,
                                        Permission need) const;

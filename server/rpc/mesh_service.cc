@@ -62,28 +62,20 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
   return call;
 }
 
-grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
-                                           std::string_view method,
-                                           std::function<absl::Status(CallScope* scope)> work) {
-  return HandleUnaryCall(context, method, gate_, [&](CallScope& scope, const FinishCall& end) {
-    pool_->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-    return absl::OkStatus();
-  });
-}
-
 grpc::ServerUnaryReactor* MeshService::QueryUpload(grpc::CallbackServerContext* context,
                                                    const v1::QueryUploadRequest* request,
                                                    v1::QueryUploadResponse* response) {
-  return Run(context, "MeshService.QueryUpload", [=, this](CallScope* scope) {
-    return FindUpload(scope->principal(), *request, response);
-  });
+  return HandleStoreCall(
+      context, "MeshService.QueryUpload", gate_, pool_,
+      [=, this](CallScope* scope) { return FindUpload(scope->principal(), *request, response); });
 }
 
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,
                                                const v1::GetMeshRequest* request,
                                                v1::Mesh* response) {
-  return Run(context, "MeshService.GetMesh",
-             [=, this](CallScope* scope) { return FindMesh(scope, *request, response); });
+  return HandleStoreCall(context, "MeshService.GetMesh", gate_, pool_, [=, this](CallScope* scope) {
+    return FindMesh(scope, *request, response);
+  });
 }
 
 grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
@@ -117,15 +109,16 @@ grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
 grpc::ServerUnaryReactor* MeshService::ListMeshes(grpc::CallbackServerContext* context,
                                                   const v1::ListMeshesRequest* request,
                                                   v1::ListMeshesResponse* response) {
-  return Run(context, "MeshService.ListMeshes",
-             [=, this](CallScope* scope) { return List(scope->principal(), *request, response); });
+  return HandleStoreCall(
+      context, "MeshService.ListMeshes", gate_, pool_,
+      [=, this](CallScope* scope) { return List(scope->principal(), *request, response); });
 }
 
 grpc::ServerUnaryReactor* MeshService::DeleteMesh(grpc::CallbackServerContext* context,
                                                   const v1::DeleteMeshRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
-  return Run(context, "MeshService.DeleteMesh",
-             [=, this](CallScope* scope) { return RemoveMesh(scope, *request); });
+  return HandleStoreCall(context, "MeshService.DeleteMesh", gate_, pool_,
+                         [=, this](CallScope* scope) { return RemoveMesh(scope, *request); });
 }
 
 absl::Status MeshService::FindUpload(const Principal& caller, const v1::QueryUploadRequest& request,

@@ -204,36 +204,26 @@ grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* PredictionService::Com
       context, timer_, limits_.upload_silence, access_, registry_, catalog_, store_, request);
 }
 
-grpc::ServerUnaryReactor* PredictionService::Run(
-    grpc::CallbackServerContext* context, std::string_view method,
-    std::function<absl::Status(CallScope* scope)> work) {
-  return HandleUnaryCall(
-      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
-        registry_->pool().Post(Lane::kStore,
-                               [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-        return absl::OkStatus();
-      });
-}
-
 grpc::ServerUnaryReactor* PredictionService::GetPrediction(grpc::CallbackServerContext* context,
                                                            const v1::GetPredictionRequest* request,
                                                            v1::Prediction* response) {
-  return Run(context, "PredictionService.GetPrediction",
-             [=, this](CallScope* scope) { return Find(scope, *request, response); });
+  return HandleStoreCall(context, "PredictionService.GetPrediction", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) { return Find(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* PredictionService::ListPredictions(
     grpc::CallbackServerContext* context, const v1::ListPredictionsRequest* request,
     v1::ListPredictionsResponse* response) {
-  return Run(context, "PredictionService.ListPredictions",
-             [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
+  return HandleStoreCall(
+      context, "PredictionService.ListPredictions", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
 }
 
 grpc::ServerUnaryReactor* PredictionService::DeletePrediction(
     grpc::CallbackServerContext* context, const v1::DeletePredictionRequest* request,
     google::protobuf::Empty* /*response*/) {
-  return Run(context, "PredictionService.DeletePrediction",
-             [=, this](CallScope* scope) { return Remove(scope, *request); });
+  return HandleStoreCall(context, "PredictionService.DeletePrediction", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) { return Remove(scope, *request); });
 }
 
 absl::Status PredictionService::Find(CallScope* scope, const v1::GetPredictionRequest& request,

@@ -3,8 +3,6 @@
 
 #pragma once
 
-#include <functional>
-#include <string_view>
 
 #include "absl/status/status.h"
 
@@ -53,10 +51,6 @@ class PredictionService final : public v1::PredictionService::CallbackService {
                                              google::protobuf::Empty* response) override;
 
  private:
-  // Finishes a call with what `work` says, which may block on the disk.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(CallScope* scope)> work);
-
   absl::Status Find(CallScope* scope, const v1::GetPredictionRequest& request,
                     v1::Prediction* response);
   absl::Status List(const v1::ListPredictionsRequest& request, const Principal& caller,

@@ -16,10 +16,10 @@ namespace tissueform {
 namespace {
 
 // Shares of a session `s` or of its project, to the principal $2. Records are NULL without one.
-#define TF_JOIN_SHARES_OF_SESSION(principal)                                              \
-  "LEFT JOIN shares a ON a.principal = " principal                                        \
-  " AND a.owner = s.owner AND a.resource = 'sessions/' || s.id "                          \
-  "LEFT JOIN shares b ON b.principal = " principal                                        \
+#define TF_JOIN_SHARES_OF_SESSION(principal)                     \
+  "LEFT JOIN shares a ON a.principal = " principal               \
+  " AND a.owner = s.owner AND a.resource = 'sessions/' || s.id " \
+  "LEFT JOIN shares b ON b.principal = " principal               \
   " AND b.owner = s.owner AND b.resource = 'projects/' || s.project "
 
 #define TF_SELECT_LINKS                                                                      \
@@ -113,12 +113,11 @@ absl::Status EraseSharesOf(SqlTransaction& transaction, const std::string& owner
 
 absl::StatusOr<std::optional<SessionGrant>> AccessQueries::FindSession(
     const std::string& id, const std::string& principal) {
-  TF_ASSIGN_OR_RETURN(
-      const SqlRows rows,
-      Ask(database_,
-          "SELECT s.id, s.owner, s.mesh_sha256, s.project, a.record, b.record FROM sessions s "
-          TF_JOIN_SHARES_OF_SESSION("$2") "WHERE s.id = $1",
-          {id, principal}, /*brief=*/true));
+  TF_ASSIGN_OR_RETURN(const SqlRows rows,
+                      Ask(database_,
+                          "SELECT s.id, s.owner, s.mesh_sha256, s.project, a.record, b.record FROM "
+                          "sessions s " TF_JOIN_SHARES_OF_SESSION("$2") "WHERE s.id = $1",
+                          {id, principal}, /*brief=*/true));
   if (rows.empty()) return std::nullopt;
   return ReadSessionGrant(rows, 0, 0, principal);
 }
@@ -143,7 +142,7 @@ absl::StatusOr<std::optional<PredictionGrant>> AccessQueries::FindPrediction(
 }
 
 absl::StatusOr<std::vector<CaseGrant>> AccessQueries::FindCases(const std::string& sha256,
-                                                                 const std::string& principal) {
+                                                                const std::string& principal) {
   TF_ASSIGN_OR_RETURN(
       const SqlRows rows,
       Ask(database_,
@@ -155,19 +154,18 @@ absl::StatusOr<std::vector<CaseGrant>> AccessQueries::FindCases(const std::strin
   std::vector<CaseGrant> cases(rows.size());
   for (size_t row = 0; row < rows.size(); ++row) {
     const absl::string_view owner = rows.Text(row, 0);
-    cases[row] = {.key = {.sha256 = sha256, .owner = std::string(owner)},
-                  .role = std::max(
-                      RoleOf(rows.Text(row, 2), owner, ResourceOfCase(sha256), principal),
-                      RoleOf(rows.Text(row, 3), owner, ResourceOfProject(rows.Text(row, 1)),
-                             principal))};
+    cases[row] = {
+        .key = {.sha256 = sha256, .owner = std::string(owner)},
+        .role = std::max(
+            RoleOf(rows.Text(row, 2), owner, ResourceOfCase(sha256), principal),
+            RoleOf(rows.Text(row, 3), owner, ResourceOfProject(rows.Text(row, 1)), principal))};
   }
   return cases;
 }
 
 absl::StatusOr<std::optional<LinkGrant>> AccessQueries::FindLink(const std::string& digest) {
-  TF_ASSIGN_OR_RETURN(
-      const SqlRows rows,
-      Ask(database_, TF_SELECT_LINKS "WHERE l.name = $1", {digest}, /*brief=*/true));
+  TF_ASSIGN_OR_RETURN(const SqlRows rows, Ask(database_, TF_SELECT_LINKS "WHERE l.name = $1",
+                                              {digest}, /*brief=*/true));
   if (rows.empty()) return std::nullopt;
   return ReadLinkGrant(rows, 0);
 }
@@ -209,7 +207,7 @@ absl::StatusOr<MeshUse> AccessQueries::FindMeshUse(const std::string& sha256) {
 }
 
 absl::StatusOr<bool> AccessQueries::IsMeshShown(const std::string& sha256,
-                                                 const std::string& principal) {
+                                                const std::string& principal) {
   TF_ASSIGN_OR_RETURN(
       const SqlRows own,
       Ask(database_,
@@ -261,8 +259,7 @@ absl::StatusOr<std::set<std::string>> AccessQueries::MeshesNear(const std::strin
   return NamesIn(rows);
 }
 
-absl::StatusOr<std::set<std::string>> AccessQueries::SharedSessions(
-    const std::string& principal) {
+absl::StatusOr<std::set<std::string>> AccessQueries::SharedSessions(const std::string& principal) {
   // The lengths of "sessions/" and "projects/" are 9.
   TF_ASSIGN_OR_RETURN(
       const SqlRows rows,
@@ -311,7 +308,8 @@ absl::StatusOr<std::set<CaseKey>> AccessQueries::SharedCases(const std::string& 
           {principal}));
   std::set<CaseKey> shared;
   ForEachShared(rows, 1, principal, [&](size_t row) {
-    shared.insert({.sha256 = std::string(rows.Text(row, 0)), .owner = std::string(rows.Text(row, 1))});
+    shared.insert(
+        {.sha256 = std::string(rows.Text(row, 0)), .owner = std::string(rows.Text(row, 1))});
   });
   return shared;
 }
@@ -346,14 +344,13 @@ absl::StatusOr<std::map<std::string, Holdings>> AccessQueries::HoldingsByOwner()
 }
 
 absl::StatusOr<Holdings> AccessQueries::HoldingsOf(const std::string& owner) {
-  TF_ASSIGN_OR_RETURN(
-      const SqlRows rows,
-      Ask(database_,
-          "SELECT (SELECT count(*) FROM sessions WHERE owner = $1), "
-          "(SELECT coalesce(sum(bytes), 0) FROM predictions WHERE owner = $1) + "
-          "(SELECT coalesce(sum(bytes), 0) FROM cases WHERE owner = $1) + "
-          "(SELECT coalesce(sum(bytes), 0) FROM mesh_rights WHERE principal = $1)",
-          {owner}));
+  TF_ASSIGN_OR_RETURN(const SqlRows rows,
+                      Ask(database_,
+                          "SELECT (SELECT count(*) FROM sessions WHERE owner = $1), "
+                          "(SELECT coalesce(sum(bytes), 0) FROM predictions WHERE owner = $1) + "
+                          "(SELECT coalesce(sum(bytes), 0) FROM cases WHERE owner = $1) + "
+                          "(SELECT coalesce(sum(bytes), 0) FROM mesh_rights WHERE principal = $1)",
+                          {owner}));
   return Holdings{.sessions = rows.Integer(0, 0), .bytes = rows.Integer(0, 1)};
 }
 

@@ -19,7 +19,8 @@ struct AccessRows {
   std::vector<MeshRight> mesh_rights = {};
 };
 
-// Where it is kept who may do what with whose. tests/server/store/access_store_contract_test.cc holds the contract.
+// Where it is kept who may do what with whose. tests/server/store/access_store_contract_test.cc
+// holds the contract.
 //
 // Thread-safe.
 class AccessStore {

@@ -52,25 +52,25 @@ auto RightsIndex() {
 }
 
 absl::Status FillSessions(SqlTransaction& transaction) {
-  return FillTable(
-      transaction, "SELECT key, record FROM sessions WHERE key > $1 ORDER BY key LIMIT $2",
-      "UPDATE sessions SET mesh_sha256 = $1, project = $2 WHERE key = $3",
-      [](absl::string_view bytes, const auto& write) -> absl::Status {
-        const absl::StatusOr<SessionRecord> record = ParseRecord(bytes);
-        if (!record.ok()) return absl::OkStatus();
-        return write({record->mesh_sha256, record->project});
-      });
+  return FillTable(transaction,
+                   "SELECT key, record FROM sessions WHERE key > $1 ORDER BY key LIMIT $2",
+                   "UPDATE sessions SET mesh_sha256 = $1, project = $2 WHERE key = $3",
+                   [](absl::string_view bytes, const auto& write) -> absl::Status {
+                     const absl::StatusOr<SessionRecord> record = ParseRecord(bytes);
+                     if (!record.ok()) return absl::OkStatus();
+                     return write({record->mesh_sha256, record->project});
+                   });
 }
 
 absl::Status FillPredictions(SqlTransaction& transaction) {
-  return FillTable(
-      transaction, "SELECT key, record FROM predictions WHERE key > $1 ORDER BY key LIMIT $2",
-      "UPDATE predictions SET mesh_sha256 = $1, bytes = $2 WHERE key = $3",
-      [](absl::string_view bytes, const auto& write) -> absl::Status {
-        const absl::StatusOr<PredictionRow> row = ParsePrediction(bytes);
-        if (!row.ok()) return absl::OkStatus();
-        return write({row->record.mesh_sha256, BytesOf(row->record)});
-      });
+  return FillTable(transaction,
+                   "SELECT key, record FROM predictions WHERE key > $1 ORDER BY key LIMIT $2",
+                   "UPDATE predictions SET mesh_sha256 = $1, bytes = $2 WHERE key = $3",
+                   [](absl::string_view bytes, const auto& write) -> absl::Status {
+                     const absl::StatusOr<PredictionRow> row = ParsePrediction(bytes);
+                     if (!row.ok()) return absl::OkStatus();
+                     return write({row->record.mesh_sha256, BytesOf(row->record)});
+                   });
 }
 
 absl::Status FillCases(SqlTransaction& transaction) {
@@ -104,18 +104,18 @@ absl::Status FillIndex(SqlTransaction& transaction) {
   TF_RETURN_IF_ERROR(FillSessions(transaction));
   TF_RETURN_IF_ERROR(FillPredictions(transaction));
   TF_RETURN_IF_ERROR(FillCases(transaction));
-  TF_RETURN_IF_ERROR(FillTable(
-      transaction, "SELECT key, record FROM shares WHERE key > $1 ORDER BY key LIMIT $2",
-      "UPDATE shares SET owner = $1, resource = $2, principal = $3 WHERE key = $4",
-      RightsIndex<ShareRow>()));
+  TF_RETURN_IF_ERROR(
+      FillTable(transaction, "SELECT key, record FROM shares WHERE key > $1 ORDER BY key LIMIT $2",
+                "UPDATE shares SET owner = $1, resource = $2, principal = $3 WHERE key = $4",
+                RightsIndex<ShareRow>()));
   TF_RETURN_IF_ERROR(FillTable(
       transaction, "SELECT key, record FROM follow_links WHERE key > $1 ORDER BY key LIMIT $2",
       "UPDATE follow_links SET session = $1, maker = $2, expires_s = $3 WHERE key = $4",
       RightsIndex<FollowLinkRow>()));
-  return FillTable(
-      transaction, "SELECT key, record FROM mesh_rights WHERE key > $1 ORDER BY key LIMIT $2",
-      "UPDATE mesh_rights SET principal = $1, sha256 = $2, bytes = $3 WHERE key = $4",
-      RightsIndex<MeshRight>());
+  return FillTable(transaction,
+                   "SELECT key, record FROM mesh_rights WHERE key > $1 ORDER BY key LIMIT $2",
+                   "UPDATE mesh_rights SET principal = $1, sha256 = $2, bytes = $3 WHERE key = $4",
+                   RightsIndex<MeshRight>());
 }
 
 }  // namespace tissueform

@@ -253,4 +253,14 @@ grpc::ServerUnaryReactor* HandleUnaryCall(
   return reactor;
 }
 
+grpc::ServerUnaryReactor* HandleStoreCall(grpc::CallbackServerContext* context,
+                                          std::string_view method, AdmissionControl* gate,
+                                          WorkerPool* pool,
+                                          std::function<absl::Status(CallScope* scope)> work) {
+  return HandleUnaryCall(context, method, gate, [&](CallScope& scope, const FinishCall& end) {
+    pool->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
+    return absl::OkStatus();
+  });
+}
+
 }  // namespace tissueform

@@ -18,6 +18,7 @@
 #include "server/access/auth/authenticator.h"
 #include "server/rpc/calls/call_observer.h"
 #include "server/rpc/calls/call_quotas.h"
+#include "server/session/worker_pool.h"
 
 namespace tissueform {
 
@@ -145,5 +146,12 @@ using FinishCall = std::function<void(const absl::Status& outcome)>;
 grpc::ServerUnaryReactor* HandleUnaryCall(
     grpc::CallbackServerContext* context, std::string_view method, AdmissionControl* gate,
     const std::function<absl::Status(CallScope& scope, const FinishCall& end)>& start);
+
+// The same for a call that waits for the store: `work` runs in Lane::kStore of `pool`, and its
+// status ends the call. `work` must not keep `scope`.
+grpc::ServerUnaryReactor* HandleStoreCall(grpc::CallbackServerContext* context,
+                                          std::string_view method, AdmissionControl* gate,
+                                          WorkerPool* pool,
+                                          std::function<absl::Status(CallScope* scope)> work);
 
 }  // namespace tissueform

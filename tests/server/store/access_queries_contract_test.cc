@@ -1,8 +1,6 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/store/access_queries.h"
-
 #include <algorithm>
 #include <future>
 #include <map>
@@ -18,6 +16,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "server/store/access_queries.h"
 #include "server/store/sql_access_store.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/stores_case.h"
@@ -263,9 +262,9 @@ TEST_P(AccessQueriesTest, ALinkComesWithWhatItsMakerHas) {
   EXPECT_EQ(found->maker->owner, "ann");
   EXPECT_EQ(found->maker->role, ShareRole::kPlanner);
   EXPECT_THAT(*queries_.LinksOf("s"), SizeIs(1));
-  ASSERT_THAT(ChangeRights(stores_.get(),
-                           {.shares = {{.resource = "projects/p", .owner = "ann", .principal = "bob"}}},
-                           {}),
+  ASSERT_THAT(ChangeRights(
+                  stores_.get(),
+                  {.shares = {{.resource = "projects/p", .owner = "ann", .principal = "bob"}}}, {}),
               IsOk());
   EXPECT_EQ((*queries_.FindLink("d"))->maker->role, std::nullopt);
 }
@@ -318,9 +317,8 @@ TEST_P(AccessQueriesTest, ADamagedShareGivesNothing) {
   Share("ann", "sessions/s", "bob");
   ASSERT_THAT(stores_->database().Run({.work =
                                            [](SqlTransaction& transaction) {
-                                             return transaction.Run(
-                                                 "UPDATE shares SET record = $1",
-                                                 {SqlBytes{"no sealed bytes"}});
+                                             return transaction.Run("UPDATE shares SET record = $1",
+                                                                    {SqlBytes{"no sealed bytes"}});
                                            }}),
               IsOk());
   EXPECT_EQ((*queries_.FindSession("s", "bob"))->role, std::nullopt);

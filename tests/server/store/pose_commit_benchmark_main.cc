@@ -13,14 +13,16 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/percentiles.h"
+#include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "server/platform/storage/database.h"
+#include "server/store/access_queries.h"
 #include "server/store/durable_store.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"
 
-// What the commit of a pose costs beside a bare commit of SQLite, in one run and in turns. Prints
-// the medians and their ratio.
+// What the commit of a pose costs beside a bare commit of SQLite, in one run and in turns; prints
+// the medians and their ratio. And what the question of who may use a session costs.
 //
 //   tissueform-store-benchmark FOLDER [COMMITS]     in a new folder below FOLDER, on the disk to
 //   ask
@@ -54,6 +56,19 @@ absl::StatusOr<std::unique_ptr<Database>> OpenBare(const std::string& path) {
   return bare;
 }
 
+absl::Status MeasureAccess(SqlDatabase* database, int questions) {
+  AccessQueries queries(database);
+  std::vector<double> micros;
+  for (int question = 0; question < questions; ++question) {
+    Stopwatch watch;
+    const auto found = queries.FindSession(absl::StrCat("s", question % kSessions), "bob");
+    micros.push_back(watch.Restart() * 1e6);
+    TF_RETURN_IF_ERROR(found.status());
+  }
+  std::printf("may they?     p50 %.1f us  p99 %.1f us\n", Median(micros), Percentile(micros, 99));
+  return absl::OkStatus();
+}
+
 int Run(const std::string& folder, int commits) {
   const auto bare = OpenBare(folder + "/bare.db");
   if (!bare.ok()) return Fail(bare.status());
@@ -81,7 +96,8 @@ int Run(const std::string& folder, int commits) {
   std::printf("bare commit   p50 %.3f ms  p99 %.3f ms\n", Median(bare_ms), Percentile(bare_ms, 99));
   std::printf("pose commit   p50 %.3f ms  p99 %.3f ms\n", Median(pose_ms), Percentile(pose_ms, 99));
   std::printf("ratio of p50  %.2f\n", Median(pose_ms) / Median(bare_ms));
-  return EXIT_SUCCESS;
+  const absl::Status measured = MeasureAccess(&(*store)->database(), commits);
+  return measured.ok() ? EXIT_SUCCESS : Fail(measured);
 }
 
 }  // namespace
