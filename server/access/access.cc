@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
@@ -296,34 +298,42 @@ int Access::CountSessionsOf(const Principal& caller, const std::string& mesh) co
   return count;
 }
 
-std::set<std::string> Access::SharedSessions(const Principal& caller) const {
-  std::set<std::string> shared;
-  MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name)) return shared;
-  for (const auto& [id, session] : index_.sessions()) {
-    const Level level = SessionLevel(caller, id);
-    if (level != Level::kNothing && level != Level::kOwner) shared.insert(id);
-  }
+absl::StatusOr<std::set<std::string>> Access::SharedSessions(const Principal& caller) const {
+  return queries_.SharedSessions(caller.name);
+}
+
+absl::StatusOr<std::set<std::string>> Access::SharedPredictions(const Principal& caller) const {
+  TF_ASSIGN_OR_RETURN(std::set<std::string> shared, queries_.SharedPredictions(caller.name));
+  if (IsBridge(caller) && exports_ != nullptr) shared.merge(exports_->Exported());
   return shared;
 }
 
-std::set<std::string> Access::SharedPredictions(const Principal& caller) const {
-  std::set<std::string> shared;
-  MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
-  for (const auto& [id, prediction] : index_.predictions()) {
-    if (PredictionLevel(caller, id) == Level::kRead) shared.insert(id);
+absl::StatusOr<std::set<CaseKey>> Access::ExportedCases() const {
+  std::set<CaseKey> exported;
+  for (const std::string& sha256 : exports_->ExportedCases()) {
+    TF_ASSIGN_OR_RETURN(const std::vector<CaseGrant> cases, queries_.FindCases(sha256, ""));
+    MutexLock lock(mutex_);
+    for (const CaseGrant& found : cases) {
+      if (IsExportedCase(found.key)) exported.insert(found.key);
+    }
   }
-  return shared;
+  return exported;
 }
 
-std::set<CaseKey> Access::SharedCases(const Principal& caller) const {
+absl::StatusOr<std::set<CaseKey>> Access::SharedCases(const Principal& caller) const {
+  TF_ASSIGN_OR_RETURN(std::set<CaseKey> open, queries_.SharedCases(caller.name));
+  if (IsBridge(caller) && exports_ != nullptr) {
+    TF_ASSIGN_OR_RETURN(std::set<CaseKey> exported, ExportedCases());
+    open.merge(exported);
+  }
   std::set<CaseKey> shared;
-  MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
-  for (const auto& [key, of_case] : index_.cases()) {
-    const absl::StatusOr<CaseKey> found = FindCase(caller, key.sha256, Permission::kRead);
-    if (found.ok() && found->owner != caller.name) shared.insert(*found);
+  std::string last;
+  for (const CaseKey& key : open) {
+    if (key.sha256 == std::exchange(last, key.sha256)) continue;
+    TF_ASSIGN_OR_RETURN(const std::vector<CaseGrant> all,
+                        queries_.FindCases(key.sha256, caller.name));
+    const CaseKey own = {.sha256 = key.sha256, .owner = caller.name};
+    if (std::ranges::find(all, own, &CaseGrant::key) == all.end()) shared.insert(key);
   }
   return shared;
 }
@@ -357,26 +367,16 @@ absl::StatusOr<FollowLinkRow> Access::GoodLink(const std::string& digest) const 
   return *link;
 }
 
-std::map<std::string, Access::Holdings> Access::HoldingsByOwner() const {
-  MutexLock lock(mutex_);
-  std::map<std::string, Holdings> holdings = index_.holdings();
-  for (const auto& [principal, bytes] : table_.mesh_bytes()) holdings[principal].bytes += bytes;
-  return holdings;
+absl::StatusOr<std::map<std::string, Holdings>> Access::HoldingsByOwner() const {
+  return queries_.HoldingsByOwner();
 }
 
 absl::Status Access::CheckStorageQuota(const Principal& caller, int64_t bytes) const {
   // A deleted file is gone in a moment.
   constexpr std::chrono::seconds kUntilDeleted{5};
   if (most_bytes_ == 0 || caller.anonymous()) return absl::OkStatus();
-  int64_t held = 0;
-  {
-    MutexLock lock(mutex_);
-    const auto own = index_.holdings().find(caller.name);
-    if (own != index_.holdings().end()) held += own->second.bytes;
-    const auto meshes = table_.mesh_bytes().find(caller.name);
-    if (meshes != table_.mesh_bytes().end()) held += meshes->second;
-  }
-  if (bytes <= most_bytes_ - held) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const Holdings held, queries_.HoldingsOf(caller.name));
+  if (bytes <= most_bytes_ - held.bytes) return absl::OkStatus();
   return QuotaExceeded("MiB of meshes, cases and predictions", "disk-mib", most_bytes_ >> 20,
                        kUntilDeleted);
 }

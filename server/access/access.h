@@ -19,6 +19,7 @@
 #include "server/access/row_reader.h"
 #include "server/access/share_table.h"
 #include "server/exports/export_queue.h"
+#include "server/store/access_queries.h"
 #include "server/store/session_store.h"
 
 namespace tissueform {
@@ -32,7 +33,8 @@ enum class Permission {
 
 // Who may do what: the one place that decides it (docs/security.md, "Permissions").
 //
-// It answers from memory, by one look-up with principal and name, and never blocks. What a
+// Checks of one resource are answered from memory, by one look-up with principal and name, and
+// never block. Lists and sums ask the store, and block. What a
 // principal may not look at answers NotFound, as what is not there, to the letter;
 // PermissionDenied is for what may be looked at only. What nobody with a name owns is open to those
 // without a name, and to them alone.
@@ -44,9 +46,10 @@ enum class Permission {
 // Thread-safe. Its lock is held over nothing but the look-ups in the exports.
 class Access {
  public:
-  // `exports`, which must outlive it, says what is to go to the PACS; null: nothing is.
-  explicit Access(UnixClock clock = SystemUnixSeconds, const ExportQueue* exports = nullptr)
-      : clock_(std::move(clock)), exports_(exports) {}
+  // Both must outlive it. `exports` says what is to go to the PACS; null: nothing is.
+  explicit Access(AccessQueries* queries, UnixClock clock = SystemUnixSeconds,
+                  const ExportQueue* exports = nullptr)
+      : queries_(*queries), clock_(std::move(clock)), exports_(exports) {}
 
   // Where several servers use one store: asked for what a call names and is not known here, on the
   // call's thread. It must outlive the calls. Call it before calls are served.
@@ -88,11 +91,11 @@ class Access {
   static absl::Status CheckExportAccess(const Principal& caller, const std::string& owner,
                                         const absl::Status& not_found, Permission need);
 
-  // What of others' a list shows to the caller.
-  std::set<std::string> SharedSessions(const Principal& caller) const;
-  std::set<std::string> SharedPredictions(const Principal& caller) const;
-  std::set<CaseKey> SharedCases(
-      const Principal& caller) const;  // one a name, and none of one's own
+  // What of others' a list shows to the caller; of cases one a name, and none that the caller has,
+  // too. Block. Errors: those of AccessQueries.
+  absl::StatusOr<std::set<std::string>> SharedSessions(const Principal& caller) const;
+  absl::StatusOr<std::set<std::string>> SharedPredictions(const Principal& caller) const;
+  absl::StatusOr<std::set<CaseKey>> SharedCases(const Principal& caller) const;
 
   // A link that is good: neither expired nor taken back, and its maker may still drag the session.
   // Errors: Unauthenticated.
@@ -101,10 +104,11 @@ class Access {
   // one store. Errors: Unauthenticated.
   absl::Status RecheckLink(const std::string& digest) const;
 
-  // What is kept, by owner; a mesh is held by each of those who have sent it.
-  using Holdings = ResourceIndex::Holdings;
-  std::map<std::string, Holdings> HoldingsByOwner() const;
-  // Whether the caller may keep so many bytes more. Errors: ResourceExhausted (a quota).
+  // What is kept, by owner; a mesh is held by each of those who have sent it. Blocks. Errors: those
+  // of AccessQueries.
+  absl::StatusOr<std::map<std::string, Holdings>> HoldingsByOwner() const;
+  // Whether the caller may keep so many bytes more. Blocks. Errors: ResourceExhausted (a quota),
+  // those of AccessQueries.
   absl::Status CheckStorageQuota(const Principal& caller, int64_t bytes) const;
   // 0: as many as there is room for. Call it before anything else.
   void set_most_bytes(int64_t most) { most_bytes_ = most; }
@@ -150,6 +154,10 @@ class Access {
                               const std::string& owner = {}) const ABSL_LOCKS_EXCLUDED(mutex_);
   bool Knows(const RowName& row) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
+  // Cases of exported predictions that a bridge may look at.
+  absl::StatusOr<std::set<CaseKey>> ExportedCases() const;
+
+  AccessQueries& queries_;
   const UnixClock clock_;
   const ExportQueue* const exports_;  // null: nothing is exported
   int64_t most_bytes_ = 0;            // of one principal

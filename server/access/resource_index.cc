@@ -6,8 +6,6 @@
 namespace tissueform {
 namespace {
 
-constexpr int64_t kVertexBytes = 12;
-
 template <typename Map, typename Key>
 const typename Map::mapped_type* FindIn(const Map& map, const Key& key) {
   const auto found = map.find(key);
@@ -21,31 +19,24 @@ void ResourceIndex::Add(const SessionRecord& record) {
   sessions_[record.id] = {
       .owner = record.owner, .project = record.project, .mesh = record.mesh_sha256};
   sessions_of_mesh_[record.mesh_sha256].insert(record.id);
-  Hold(record.owner, 1, 0);
 }
 
 void ResourceIndex::Add(const PredictionRecord& record) {
   RemovePrediction(record.id);
   predictions_[record.id] = {
-      .owner = record.owner,
-      .session = record.session,
-      .mesh = record.mesh_sha256,
-      .bytes = kVertexBytes * record.vertex_count + static_cast<int64_t>(record.metadata.size())};
+      .owner = record.owner, .session = record.session, .mesh = record.mesh_sha256};
   predictions_of_mesh_[record.mesh_sha256].insert(record.id);
-  Hold(record.owner, 0, predictions_[record.id].bytes);
 }
 
 void ResourceIndex::Add(const CaseRecord& record) {
   RemoveCase(record.key());
-  cases_[record.key()] = {.project = record.project, .bytes = record.total_bytes};
-  Hold(record.owner, 0, record.total_bytes);
+  cases_[record.key()] = {.project = record.project};
 }
 
 void ResourceIndex::RemoveSession(const std::string& id) {
   const auto found = sessions_.find(id);
   if (found == sessions_.end()) return;
   Forget(&sessions_of_mesh_, found->second.mesh, id);
-  Hold(found->second.owner, -1, 0);
   sessions_.erase(found);
 }
 
@@ -53,22 +44,13 @@ void ResourceIndex::RemovePrediction(const std::string& id) {
   const auto found = predictions_.find(id);
   if (found == predictions_.end()) return;
   Forget(&predictions_of_mesh_, found->second.mesh, id);
-  Hold(found->second.owner, 0, -found->second.bytes);
   predictions_.erase(found);
 }
 
 void ResourceIndex::RemoveCase(const CaseKey& key) {
   const auto found = cases_.find(key);
   if (found == cases_.end()) return;
-  Hold(key.owner, 0, -found->second.bytes);
   cases_.erase(found);
-}
-
-void ResourceIndex::Hold(const std::string& owner, int64_t sessions, int64_t bytes) {
-  Holdings& holdings = holdings_[owner];
-  holdings.sessions += sessions;
-  holdings.bytes += bytes;
-  if (holdings.sessions == 0 && holdings.bytes == 0) holdings_.erase(owner);
 }
 
 const ResourceIndex::Session* ResourceIndex::FindSession(const std::string& id) const {

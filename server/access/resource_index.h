@@ -26,11 +26,9 @@ class ResourceIndex {
     std::string owner = {};
     std::string session = {};  // that it was made in; it may be gone, or be another's by now
     std::string mesh = {};
-    int64_t bytes = 0;
   };
   struct Case {
     std::string project = {};
-    int64_t bytes = 0;
   };
 
   void Add(const SessionRecord& record);
@@ -49,13 +47,6 @@ class ResourceIndex {
   const std::map<std::string, Prediction>& predictions() const { return predictions_; }
   const std::map<CaseKey, Case>& cases() const { return cases_; }
 
-  // Of what is kept: how much is whose.
-  struct Holdings {
-    int64_t sessions = 0;
-    int64_t bytes = 0;  // of predictions and cases
-  };
-  const std::map<std::string, Holdings>& holdings() const { return holdings_; }
-
   // Sessions and predictions that hold a mesh.
   const std::set<std::string>& SessionsOf(const std::string& mesh) const;
   const std::set<std::string>& PredictionsOf(const std::string& mesh) const;
@@ -63,7 +54,6 @@ class ResourceIndex {
  private:
   using NamesOf = std::map<std::string, std::set<std::string>>;
 
-  void Hold(const std::string& owner, int64_t sessions, int64_t bytes);
   static void Forget(NamesOf* names, const std::string& of, const std::string& id);
   static const std::set<std::string>& Of(const NamesOf& names, const std::string& of);
 
@@ -72,7 +62,6 @@ class ResourceIndex {
   std::map<CaseKey, Case> cases_;
   NamesOf sessions_of_mesh_;
   NamesOf predictions_of_mesh_;
-  std::map<std::string, Holdings> holdings_;  // by owner
 };
 
 }  // namespace tissueform

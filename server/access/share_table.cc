@@ -19,18 +19,14 @@ void EraseFrom(std::map<std::string, std::set<std::string>>* sets, const std::st
 
 void ShareTable::Add(const AccessRows& rows) {
   for (const ShareRow& row : rows.shares) {
-    const bool is_new = shares_[{row.owner, row.resource}].emplace(row.principal, row.role).second;
     shares_[{row.owner, row.resource}][row.principal] = row.role;
-    if (is_new) ++given_[row.principal];
   }
   for (const FollowLinkRow& row : rows.links) {
     links_[row.digest] = row;
     links_of_session_[row.session].insert(row.digest);
   }
   for (const MeshRight& row : rows.mesh_rights) {
-    Remove(row);
     holders_of_mesh_[row.sha256][row.principal] = row.bytes;
-    mesh_bytes_[row.principal] += row.bytes;
   }
 }
 
@@ -44,7 +40,6 @@ void ShareTable::Remove(const ShareRow& row) {
   const auto found = shares_.find({row.owner, row.resource});
   if (found == shares_.end() || found->second.erase(row.principal) == 0) return;
   if (found->second.empty()) shares_.erase(found);
-  if (--given_[row.principal] == 0) given_.erase(row.principal);
 }
 
 void ShareTable::Remove(const FollowLinkRow& row) {
@@ -55,10 +50,7 @@ void ShareTable::Remove(const FollowLinkRow& row) {
 void ShareTable::Remove(const MeshRight& row) {
   const auto mesh = holders_of_mesh_.find(row.sha256);
   if (mesh == holders_of_mesh_.end()) return;
-  const auto holder = mesh->second.find(row.principal);
-  if (holder == mesh->second.end()) return;
-  if ((mesh_bytes_[row.principal] -= holder->second) == 0) mesh_bytes_.erase(row.principal);
-  mesh->second.erase(holder);
+  mesh->second.erase(row.principal);
   if (mesh->second.empty()) holders_of_mesh_.erase(mesh);
 }
 

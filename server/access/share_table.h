@@ -26,8 +26,6 @@ class ShareTable {
                                   const std::string& principal) const;
   // Of one resource, by principal, rising.
   std::vector<ShareRow> SharesOf(const std::string& owner, const std::string& resource) const;
-  // Whether anything is shared with it.
-  bool HasAny(const std::string& principal) const { return given_.contains(principal); }
 
   // Null where there is none.
   const FollowLinkRow* FindLink(const std::string& digest) const;
@@ -39,8 +37,6 @@ class ShareTable {
   // Who has sent the mesh, and its bytes.
   using Holders = std::map<std::string, int64_t>;
   const Holders& HoldersOf(const std::string& sha256) const;
-  // Of the meshes that principals have sent, by principal.
-  const std::map<std::string, int64_t>& mesh_bytes() const { return mesh_bytes_; }
 
  private:
   using Shared = std::pair<std::string, std::string>;  // owner, resource
@@ -50,11 +46,9 @@ class ShareTable {
   void Remove(const MeshRight& row);
 
   std::map<Shared, std::map<std::string, ShareRole>> shares_;  // by principal
-  std::map<std::string, int> given_;                           // shares by principal
   std::map<std::string, FollowLinkRow> links_;                 // by digest
   std::map<std::string, std::set<std::string>> links_of_session_;
   std::map<std::string, Holders> holders_of_mesh_;
-  std::map<std::string, int64_t> mesh_bytes_;
 };
 
 }  // namespace tissueform

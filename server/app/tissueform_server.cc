@@ -148,7 +148,9 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       export_store_(std::move(parts.opened.exports)),
       exports_(options.exports, export_store_.get(), [this] { return stores_->NowS(); }),
       export_watches_(options.exports.max_watches),
-      access_([this] { return stores_->NowS(); }, &exports_),
+      access_queries_(&parts.opened.stores->database()),
+      access_(
+          &access_queries_, [this] { return stores_->NowS(); }, &exports_),
       access_changes_(options.access, access_store_.get(), &access_),
       authenticator_(parts.authenticator == nullptr
                          ? nullptr

@@ -45,6 +45,7 @@
 #include "server/session/mesh_uploads.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
+#include "server/store/access_queries.h"
 #include "server/store/access_store.h"
 #include "server/store/stores.h"
 #include "server/telemetry/telemetry.h"
@@ -133,6 +134,7 @@ class TissueformServer {
   std::unique_ptr<ExportStore> export_store_;  // as access_store_
   ExportQueue exports_;
   ExportWatches export_watches_;
+  AccessQueries access_queries_;  // of the rows of the stores
   Access access_;
   AccessChanges access_changes_;
   std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in

@@ -192,34 +192,37 @@ grpc::ServerUnaryReactor* AccessService::DeleteFollowLinks(
 grpc::ServerUnaryReactor* AccessService::GetUsage(grpc::CallbackServerContext* context,
                                                   const v1::GetUsageRequest* request,
                                                   v1::Usage* response) {
-  return HandleUnaryCall(
-      context, "AccessService.GetUsage", gate_,
-      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
-        TF_ASSIGN_OR_RETURN(const std::string asked,
-                            AskedPrincipal(scope.principal(), request->principal()));
-        std::map<std::string, v1::PrincipalUsage> usage = CollectUsage();
-        if (asked != kEverybody) {
-          v1::PrincipalUsage one = std::move(usage[asked]);
-          usage.clear();
-          usage[asked] = std::move(one);
-        }
-        for (auto& [name, of_name] : usage) {
-          of_name.set_principal(name);
-          *response->add_principals() = std::move(of_name);
-        }
-        std::stable_sort(response->mutable_principals()->begin(),
-                         response->mutable_principals()->end(),
-                         [](const v1::PrincipalUsage& a, const v1::PrincipalUsage& b) {
-                           return a.memory_bytes() > b.memory_bytes();
-                         });
-        end(absl::OkStatus());
-        return absl::OkStatus();
-      });
+  return HandleStoreCall(
+      context, "AccessService.GetUsage", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) { return ReportUsage(scope->principal(), *request, response); });
 }
 
-std::map<std::string, v1::PrincipalUsage> AccessService::CollectUsage() const {
+absl::Status AccessService::ReportUsage(const Principal& caller, const v1::GetUsageRequest& request,
+                                        v1::Usage* response) const {
+  TF_ASSIGN_OR_RETURN(const std::string asked, AskedPrincipal(caller, request.principal()));
+  using UsageOf = std::map<std::string, v1::PrincipalUsage>;
+  TF_ASSIGN_OR_RETURN(UsageOf usage, CollectUsage());
+  if (asked != kEverybody) {
+    v1::PrincipalUsage one = std::move(usage[asked]);
+    usage.clear();
+    usage[asked] = std::move(one);
+  }
+  for (auto& [name, of_name] : usage) {
+    of_name.set_principal(name);
+    *response->add_principals() = std::move(of_name);
+  }
+  std::stable_sort(response->mutable_principals()->begin(), response->mutable_principals()->end(),
+                   [](const v1::PrincipalUsage& a, const v1::PrincipalUsage& b) {
+                     return a.memory_bytes() > b.memory_bytes();
+                   });
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::map<std::string, v1::PrincipalUsage>> AccessService::CollectUsage() const {
   std::map<std::string, v1::PrincipalUsage> usage;
-  for (const auto& [owner, held] : changes_->access().HoldingsByOwner()) {
+  using HoldingsOfAll = std::map<std::string, Holdings>;
+  TF_ASSIGN_OR_RETURN(const HoldingsOfAll holdings, changes_->access().HoldingsByOwner());
+  for (const auto& [owner, held] : holdings) {
     usage[owner].set_stored_sessions(held.sessions);
     usage[owner].set_disk_bytes(held.bytes);
   }

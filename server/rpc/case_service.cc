@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -136,11 +137,11 @@ absl::Status CaseService::List(const v1::ListCasesRequest& request, const Princi
                                v1::ListCasesResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  TF_ASSIGN_OR_RETURN(const CaseStore::Page found,
-                      store_->List({.owner = caller.name,
-                                    .also = access_.SharedCases(caller),
-                                    .after = page.after,
-                                    .limit = page.size}));
+  TF_ASSIGN_OR_RETURN(std::set<CaseKey> shared, access_.SharedCases(caller));
+  TF_ASSIGN_OR_RETURN(const CaseStore::Page found, store_->List({.owner = caller.name,
+                                                                 .also = std::move(shared),
+                                                                 .after = page.after,
+                                                                 .limit = page.size}));
   for (const CaseRecord& record : found.records) *response->add_cases() = ToProto(record);
   response->set_next_page_token(found.next);
   return absl::OkStatus();

@@ -3,7 +3,6 @@
 
 #pragma once
 
-
 #include "absl/status/status.h"
 
 #include "server/access/access.h"

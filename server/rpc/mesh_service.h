@@ -3,7 +3,6 @@
 
 #pragma once
 
-
 #include "server/access/access_changes.h"
 #include "server/rpc/calls/call_scope.h"
 #include "server/session/deadline_timer.h"

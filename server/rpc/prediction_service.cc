@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -48,17 +49,8 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
     const absl::Status status = scope_.admission().ok() ? Check(limits) : scope_.admission();
     if (!status.ok()) {
       End(status);
-    } else if (request_.request_id().empty()) {
-      Solve();
     } else {
-      PostToStore([this] {
-        const absl::Status earlier = TakeEarlier();
-        if (absl::IsNotFound(earlier)) {
-          Solve();
-        } else {
-          End(earlier);
-        }
-      });
+      PostToStore([this] { Begin(); });
     }
   }
 
@@ -70,6 +62,17 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   void OnDone() override { delete this; }
 
  private:
+  // Blocks on the store.
+  void Begin() {
+    const absl::Status earlier =
+        request_.request_id().empty() ? absl::NotFoundError("") : TakeEarlier();
+    if (absl::IsNotFound(earlier)) {
+      Solve();
+    } else {
+      End(earlier);
+    }
+  }
+
   absl::Status Check(const ServiceLimits& limits) {
     const size_t bytes = request_.request_id().size();
     if (bytes > static_cast<size_t>(limits.max_request_id_bytes)) {
@@ -241,10 +244,9 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
                                      v1::ListPredictionsResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  PredictionStore::ListRequest wanted{.owner = caller.name,
-                                      .also = access_->SharedPredictions(caller),
-                                      .after = page.after,
-                                      .limit = page.size};
+  TF_ASSIGN_OR_RETURN(std::set<std::string> shared, access_->SharedPredictions(caller));
+  PredictionStore::ListRequest wanted{
+      .owner = caller.name, .also = std::move(shared), .after = page.after, .limit = page.size};
   if (!request.session().empty()) {
     TF_ASSIGN_OR_RETURN(wanted.session, ParseSessionName(request.session()));
   }

@@ -4,6 +4,8 @@
 #include "server/rpc/session_service.h"
 
 #include <memory>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -88,20 +90,30 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
       [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const PageRequest page,
                             ReadPageRequest(request->page_size(), request->page_token()));
-        registry_->sync().List({.owner = scope.principal().name,
-                                .also = access_.SharedSessions(scope.principal()),
-                                .after = page.after,
-                                .limit = page.size},
-                               [end, response](const absl::StatusOr<SessionViewPage>& views) {
-                                 if (views.ok()) {
-                                   for (const SessionView& view : views->views) {
-                                     *response->add_sessions() = ToProto(view);
-                                   }
-                                   response->set_next_page_token(views->next);
-                                 }
-                                 end(views.status());
-                               });
+        registry_->pool().Post(Lane::kStore, [=, this, caller = scope.principal()] {
+          ListSessionsOf(caller, page, response, end);
+        });
         return absl::OkStatus();
+      });
+}
+
+void SessionService::ListSessionsOf(const Principal& caller, const PageRequest& page,
+                                    v1::ListSessionsResponse* response, const FinishCall& end) {
+  absl::StatusOr<std::set<std::string>> shared = access_.SharedSessions(caller);
+  if (!shared.ok()) {
+    end(shared.status());
+    return;
+  }
+  registry_->sync().List(
+      {.owner = caller.name, .also = *std::move(shared), .after = page.after, .limit = page.size},
+      [end, response](const absl::StatusOr<SessionViewPage>& views) {
+        if (views.ok()) {
+          for (const SessionView& view : views->views) {
+            *response->add_sessions() = ToProto(view);
+          }
+          response->set_next_page_token(views->next);
+        }
+        end(views.status());
       });
 }
 

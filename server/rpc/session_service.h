@@ -9,6 +9,7 @@
 
 #include "server/access/access.h"
 #include "server/rpc/calls/call_scope.h"
+#include "server/rpc/resource_conversion.h"
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
@@ -49,6 +50,10 @@ class SessionService final : public v1::SessionService::CallbackService {
                                           google::protobuf::Empty* response) override;
 
  private:
+  // Blocks on the store, then ends the call.
+  void ListSessionsOf(const Principal& caller, const PageRequest& page,
+                      v1::ListSessionsResponse* response, const FinishCall& end);
+
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
   const Access& access_;

@@ -43,7 +43,10 @@ class InMemoryCaseStore : private InMemoryBase, public SqlCaseStore {
 
 class InMemoryAccessStore : private InMemoryBase, public SqlAccessStore {
  public:
-  InMemoryAccessStore() : SqlAccessStore(database()) {}
+  InMemoryAccessStore() : SqlAccessStore(InMemoryBase::database()) {}
+
+  using InMemoryBase::database;
+  using InMemoryBase::stores;
 };
 
 }  // namespace tissueform

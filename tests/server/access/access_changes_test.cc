@@ -63,7 +63,8 @@ class AccessChangesTest : public ::testing::Test {
   const Principal bob_{.name = "bob"};
   int64_t now_s_ = 1000;
   InMemoryAccessStore store_;
-  Access access_{[this] { return now_s_; }};
+  AccessQueries queries_{store_.database()};
+  Access access_{&queries_, [this] { return now_s_; }};
   AccessChanges changes_{
       {.max_shares_per_resource = 2, .max_links_per_session = 2}, &store_, &access_};
 };
@@ -138,7 +139,7 @@ TEST_F(AccessChangesTest, LinksAreTakenBackByWhoMayDrag) {
 
 TEST_F(AccessChangesTest, WhatWasLearntCountsAfterARestart) {
   ASSERT_THAT(Share(ann_, "sessions/s", "bob"), IsOk());
-  Access access([this] { return now_s_; });
+  Access access(&queries_, [this] { return now_s_; });
   AccessChanges changes({}, &store_, &access);
   ASSERT_THAT(changes.LoadAll(), IsOk());
   SessionRecord session;
@@ -221,7 +222,8 @@ class FollowingAccessChangesTest : public ::testing::Test {
   const Principal bob_{.name = "bob"};
   const ShareRow share_{.resource = "sessions/s", .owner = "ann", .principal = "bob"};
   HeldAccessStore store_;
-  Access access_;
+  AccessQueries queries_{store_.rows().database()};
+  Access access_{&queries_};
   AccessChanges changes_{{}, &store_, &access_};
 };
 
@@ -259,7 +261,7 @@ TEST_F(FollowingAccessChangesTest, WhatIsGivenWhileAllIsReadStays) {
 }
 
 TEST_F(FollowingAccessChangesTest, WhatOneServerGivesWhileAnotherDeletesTheSessionOpensNoNextOne) {
-  Access access_there;
+  Access access_there(&queries_);
   AccessChanges there({}, &store_.rows(), &access_there);
   const auto add = [](AccessChanges* changes) {
     SessionRecord session;

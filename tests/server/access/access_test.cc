@@ -12,8 +12,11 @@
 #include "server/access/access_changes.h"
 #include "server/exports/export_queue.h"
 #include "server/exports/export_store.h"
+#include "server/store/access_queries.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/sql_stores.h"
-#include "tests/testing/in_memory_stores.h"
+#include "tests/server/store/store_samples.h"
+#include "tests/server/store/waiting_calls.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {
@@ -24,7 +27,8 @@ using ::testing::IsEmpty;
 using Code = absl::StatusCode;
 
 const std::string kMesh(64, 'e');
-const std::string kCase(64, 'c');
+const std::string kCaseBytes = "the bytes of a case";
+const std::string kCase = CaseRecordOf(kCaseBytes).sha256;
 
 // Ann has a session, a prediction of it and a case, all in one project but the prediction; nobody
 // else has anything.
@@ -36,15 +40,32 @@ class AccessTest : public ::testing::Test {
     session.owner = ann_.name;
     session.project = "p";
     session.mesh_sha256 = kMesh;
-    changes_.Added(session);
+    Add(session);
     PredictionRecord prediction;
     prediction.id = "q";
     prediction.owner = ann_.name;
     prediction.session = "s";
     prediction.mesh_sha256 = kMesh;
     prediction.case_sha256 = kCase;
-    changes_.Added(prediction);
-    changes_.Added(CaseRecord{.sha256 = kCase, .owner = ann_.name, .project = "p"});
+    Add(prediction);
+    AddCase(ann_.name, "p");
+  }
+
+  // Into the store and into what is known.
+  void Add(const SessionRecord& record) {
+    ASSERT_THAT(CreateSession(stores_->sessions(), record), IsOk());
+    changes_.Added(record);
+  }
+  void Add(const PredictionRecord& record) {
+    ASSERT_THAT(stores_->predictions().Create(record, ""), IsOk());
+    changes_.Added(record);
+  }
+  void AddCase(const std::string& owner, const std::string& project) {
+    CaseRecord record = CaseRecordOf(kCaseBytes);
+    record.owner = owner;
+    record.project = project;
+    ASSERT_THAT(KeepCase(stores_->cases(), record, kCaseBytes), IsOk());
+    changes_.Added(record);
   }
 
   void Export(const std::string& prediction) {
@@ -62,12 +83,13 @@ class AccessTest : public ::testing::Test {
   const Principal bob_{.name = "bob"};
   const Principal nobody_ = {};
   int64_t now_s_ = 1000;
-  InMemoryAccessStore store_;
   std::unique_ptr<Stores> stores_ = *OpenInMemoryStores();
+  SqlAccessStore store_{&stores_->database()};
+  AccessQueries queries_{&stores_->database()};
   std::unique_ptr<ExportStore> export_store_ =
       std::make_unique<SqlExportStore>(&stores_->database());
   ExportQueue exports_{{}, export_store_.get()};
-  Access access_{[this] { return now_s_; }, &exports_};
+  Access access_{&queries_, [this] { return now_s_; }, &exports_};
   AccessChanges changes_{{}, &store_, &access_};
 };
 
@@ -89,11 +111,11 @@ TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
               StatusIs(Code::kPermissionDenied));
   EXPECT_THAT(access_.CheckSessionAccess(bridge, "s", Permission::kRead),
               StatusIs(Code::kNotFound));
-  EXPECT_THAT(access_.SharedPredictions(bridge), ElementsAre("q"));
-  ASSERT_EQ(access_.SharedCases(bridge).size(), 1U);
+  EXPECT_THAT(*access_.SharedPredictions(bridge), ElementsAre("q"));
+  ASSERT_EQ(access_.SharedCases(bridge)->size(), 1U);
   ASSERT_THAT(exports_.RemoveOf("q"), IsOk());
   EXPECT_FALSE(looks(bridge));
-  EXPECT_THAT(access_.SharedPredictions(bridge), IsEmpty());
+  EXPECT_THAT(*access_.SharedPredictions(bridge), IsEmpty());
   Export("q");
   changes_.PredictionRemoved("q");
   EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
@@ -106,7 +128,7 @@ TEST_F(AccessTest, WhoNamesAnothersCaseDoesNotOpenItToABridge) {
   foreign.id = "b";
   foreign.owner = bob_.name;
   foreign.case_sha256 = kCase;
-  changes_.Added(foreign);
+  Add(foreign);
   Export("b");
   EXPECT_THAT(access_.CheckPredictionAccess(bridge, "b", Permission::kRead), IsOk());
   EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), StatusIs(Code::kNotFound));
@@ -171,7 +193,7 @@ TEST_F(AccessTest, WithoutLoginsWhatNobodyHasIsEverybodys) {
   SessionRecord session;
   session.id = "t";
   session.mesh_sha256 = std::string(64, 'a');
-  changes_.Added(session);
+  Add(session);
   EXPECT_THAT(access_.CheckSessionAccess(nobody_, "t", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "t", Permission::kRead), StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.CheckMeshAccess(nobody_, session.mesh_sha256, Permission::kOwner), IsOk());
@@ -193,9 +215,9 @@ TEST_F(AccessTest, AViewerLooksAndAPlannerDrags) {
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kWrite), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kOwner),
               StatusIs(Code::kPermissionDenied));
-  EXPECT_THAT(access_.SharedSessions(bob_), ElementsAre("s"));
-  EXPECT_THAT(access_.SharedPredictions(bob_), ElementsAre("q"));
-  EXPECT_THAT(access_.SharedSessions(ann_), IsEmpty()) << "they are her own";
+  EXPECT_THAT(*access_.SharedSessions(bob_), ElementsAre("s"));
+  EXPECT_THAT(*access_.SharedPredictions(bob_), ElementsAre("q"));
+  EXPECT_THAT(*access_.SharedSessions(ann_), IsEmpty()) << "they are her own";
 }
 
 TEST_F(AccessTest, AShareOfAProjectIsOneOfAllThatItsOwnerHasInIt) {
@@ -204,12 +226,12 @@ TEST_F(AccessTest, AShareOfAProjectIsOneOfAllThatItsOwnerHasInIt) {
   ASSERT_OK_AND_ASSIGN(const CaseKey found,
                        access_.CheckCaseAccess(bob_, kCase, Permission::kRead));
   EXPECT_EQ(found.owner, "ann");
-  EXPECT_THAT(access_.SharedCases(bob_), ElementsAre(CaseKey{kCase, "ann"}));
+  EXPECT_THAT(*access_.SharedCases(bob_), ElementsAre(CaseKey{kCase, "ann"}));
   SessionRecord others;
   others.id = "o";
   others.owner = "cid";
   others.project = "p";
-  changes_.Added(others);
+  Add(others);
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "o", Permission::kRead), StatusIs(Code::kNotFound))
       << "another's project of this name";
 }
@@ -219,17 +241,18 @@ TEST_F(AccessTest, ACaseOfOnesOwnComesBeforeOneThatIsShared) {
   EXPECT_EQ(access_.CheckCaseAccess(bob_, kCase, Permission::kRead)->owner, "ann");
   EXPECT_THAT(access_.CheckCaseAccess(bob_, kCase, Permission::kOwner),
               StatusIs(Code::kPermissionDenied));
-  changes_.Added(CaseRecord{.sha256 = kCase, .owner = "bob"});
+  AddCase("bob", "");
   EXPECT_EQ(access_.CheckCaseAccess(bob_, kCase, Permission::kOwner)->owner, "bob");
-  EXPECT_THAT(access_.SharedCases(bob_), IsEmpty()) << "one a name";
+  EXPECT_THAT(*access_.SharedCases(bob_), IsEmpty()) << "one a name";
 }
 
 TEST_F(AccessTest, AnIdThatAnotherTakesAgainOpensNoPredictionOfItsFirstOwner) {
+  ASSERT_THAT(DeleteSession(stores_->sessions(), "s"), IsOk());
   changes_.SessionRemoved("s");
   SessionRecord session;
   session.id = "s";
   session.owner = "bob";
-  changes_.Added(session);
+  Add(session);
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckPredictionAccess(bob_, "q", Permission::kRead),
               StatusIs(Code::kNotFound));
@@ -281,6 +304,18 @@ TEST_F(AccessTest, ALinkCallsWhatAFollowerNeedsAndAPublisherUploadsCases) {
   EXPECT_THAT(
       Access::CheckMethodAccess({.name = "ann", .roles = {"publisher"}}, "CaseService.UploadCase"),
       IsOk());
+}
+
+TEST_F(AccessTest, WhatIsKeptCountsForItsOwner) {
+  access_.set_most_bytes(100);
+  ASSERT_OK_AND_ASSIGN(const auto holdings, access_.HoldingsByOwner());
+  const auto bytes = static_cast<int64_t>(kCaseBytes.size());
+  EXPECT_EQ(holdings.at("ann").bytes, bytes);
+  EXPECT_EQ(holdings.at("ann").sessions, 1);
+  EXPECT_THAT(access_.CheckStorageQuota(ann_, 100 - bytes), IsOk());
+  EXPECT_THAT(access_.CheckStorageQuota(ann_, 101 - bytes), StatusIs(Code::kResourceExhausted));
+  EXPECT_THAT(access_.CheckStorageQuota(bob_, 100), IsOk());
+  EXPECT_THAT(access_.CheckStorageQuota(nobody_, 1000), IsOk()) << "nobody logs in";
 }
 
 TEST_F(AccessTest, OnlyAProjectOfTheTokenTakesNewResources) {

@@ -51,7 +51,8 @@ class LinkAuthenticatorTest : public ::testing::Test {
   const std::string token_ = NewLinkToken();
   int64_t now_s_ = 1000;
   InMemoryAccessStore store_;
-  Access access_{[this] { return now_s_; }};
+  AccessQueries queries_{store_.database()};
+  Access access_{&queries_, [this] { return now_s_; }};
   AccessChanges changes_{{}, &store_, &access_};
   Everybody everybody_;
   LinkAuthenticator links_{&access_, &everybody_};

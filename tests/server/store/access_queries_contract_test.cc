@@ -184,7 +184,7 @@ class AccessQueriesTest : public ::testing::TestWithParam<StoresCase> {
     std::set<CaseKey> shared;
     for (const auto& [key, project] : world_.cases) {
       ASSERT_OK_AND_ASSIGN(const auto found, queries_.FindCases(key.sha256, who));
-      const auto at = std::ranges::find_if(found, [&](const auto& of) { return of.key == key; });
+      const auto at = std::ranges::find(found, key, &CaseGrant::key);
       ASSERT_NE(at, found.end()) << key.owner;
       const auto role = world_.Role(key.owner, "cases/" + key.sha256, project, who);
       EXPECT_EQ(at->role, role) << key.owner << " for " << who;
