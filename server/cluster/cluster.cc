@@ -42,14 +42,11 @@ Cluster::Cluster(const ClusterOptions& options, std::string name, PostgresStores
                  std::unique_ptr<PostgresPool> pool)
     : pool_(std::move(pool)),
       stores_(stores),
-      node_(pool_.get(), options, std::move(name)),
-      lookups_(pool_.get()) {}
+      node_(pool_.get(), options, std::move(name)) {}
 
-void Cluster::Join(ClusterListeners rooms, Access* access) {
+void Cluster::Join(ClusterListeners rooms) {
   rooms.stores = stores_;
   rooms_ = rooms;
-  rooms.access->EnableClusterMode();
-  access->set_row_reader(&lookups_);
   rooms.exports->set_read_gate(
       [this](const std::string& id, const std::function<absl::Status()>& read) {
         return lookups_.ReadForExport(id, read);
@@ -98,7 +95,7 @@ void Cluster::AddTo(MetricsPage* page) {
   page->AddGauge("tissueform_node_name_taken", "1 while another server has this one's name.", {},
                  [this] { return node_.nodes().IsNameTaken() ? 1.0 : 0.0; });
   page->AddCounter("tissueform_row_lookups_total",
-                   "Database lookups of names that this node did not know.", {},
+                   "Database lookups of exports that this node did not know.", {},
                    [this] { return static_cast<double>(lookups_.lookups()); });
 }
 

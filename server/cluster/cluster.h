@@ -11,7 +11,6 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/access/access.h"
 #include "server/cluster/change_follower.h"
 #include "server/cluster/cluster_node.h"
 #include "server/cluster/cluster_options.h"
@@ -41,7 +40,7 @@ class Cluster {
   const ReadThroughLoader& lookups() const { return lookups_; }
 
   // Whatever the rooms do not know they look for from now on. All must outlive Stop.
-  void Join(ClusterListeners rooms, Access* access);
+  void Join(ClusterListeners rooms);
   // `free_bytes` says how much memory sessions may still take here; any thread.
   void Start(std::function<int64_t()> free_bytes);
   // No room is told of anything any more; leases are renewed no longer.

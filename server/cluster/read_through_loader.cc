@@ -11,44 +11,19 @@
 namespace tissueform {
 namespace {
 
-constexpr int kExportKind = -1;
 constexpr size_t kMaxRemembered = 10'000;
 
 }  // namespace
-
-ReadThroughLoader::ReadThroughLoader(PostgresPool* pool)
-    : blobs_(pool),
-      database_(pool),
-      sessions_(&database_, SystemUnixSeconds),
-      predictions_(&database_, &blobs_),
-      cases_(&database_, &blobs_),
-      rows_(&database_) {}
-
-absl::StatusOr<FoundRows> ReadThroughLoader::ReadRow(const RowName& row) {
-  FoundRows found;
-  TF_RETURN_IF_ERROR(
-      Look({.kind = static_cast<int>(row.kind), .name = row.name, .owner = row.owner},
-           [&] { return Read(row, &found); }));
-  return found;
-}
-
-absl::Status ReadThroughLoader::ReadForExport(const std::string& id,
-                                              const std::function<absl::Status()>& read) {
-  return Look({.kind = kExportKind, .name = id}, [&]() -> absl::Status {
-    TF_RETURN_IF_ERROR(read());
-    return absl::NotFoundError("");  // not again at once, whatever it has found
-  });
-}
 
 int64_t ReadThroughLoader::lookups() const {
   MutexLock lock(mutex_);
   return lookups_;
 }
 
-absl::StatusOr<bool> ReadThroughLoader::Begin(const Key& key) {
+absl::StatusOr<bool> ReadThroughLoader::Begin(const std::string& id) {
   const auto now = std::chrono::steady_clock::now();
   MutexLock lock(mutex_);
-  const auto missing = missing_.find(key);
+  const auto missing = missing_.find(id);
   if (missing != missing_.end() && now < missing->second) return false;
   while (reading_ >= kMaxAtOnce && now >= silent_until_) {
     if (!place_.WaitUntil(mutex_, now + kPatience) && reading_ >= kMaxAtOnce) break;
@@ -63,59 +38,19 @@ absl::StatusOr<bool> ReadThroughLoader::Begin(const Key& key) {
   return true;
 }
 
-absl::Status ReadThroughLoader::Look(const Key& key, const std::function<absl::Status()>& read) {
-  TF_ASSIGN_OR_RETURN(const bool begun, Begin(key));
+absl::Status ReadThroughLoader::ReadForExport(const std::string& id,
+                                              const std::function<absl::Status()>& read) {
+  TF_ASSIGN_OR_RETURN(const bool begun, Begin(id));
   if (!begun) return absl::OkStatus();
   const absl::Status status = read();
   const auto until = std::chrono::steady_clock::now() + kRemembered;
   MutexLock lock(mutex_);
   --reading_;
   place_.NotifyAll();
-  if (absl::IsUnavailable(status)) {
-    silent_until_ = until;
-    return status;
-  }
-  if (status.ok()) {
-    missing_.erase(key);
-  } else {
-    missing_[key] = until;
-  }
-  return absl::OkStatus();
-}
-
-absl::Status ReadThroughLoader::ReadSession(const std::string& id, FoundRows* found) {
-  std::promise<absl::StatusOr<SessionRecord>> answer;
-  sessions_.Get(
-      id, [&answer](absl::StatusOr<SessionRecord> record) { answer.set_value(std::move(record)); });
-  TF_ASSIGN_OR_RETURN(found->session, answer.get_future().get());
-  return absl::OkStatus();
-}
-
-absl::Status ReadThroughLoader::Read(const RowName& row, FoundRows* found) {
-  switch (row.kind) {
-    case RowName::Kind::kSession:
-      return ReadSession(row.name, found);
-    case RowName::Kind::kPrediction: {
-      TF_ASSIGN_OR_RETURN(found->prediction, predictions_.Get(row.name));
-      return absl::OkStatus();
-    }
-    case RowName::Kind::kCase: {
-      TF_ASSIGN_OR_RETURN(found->of_case, cases_.Find({.sha256 = row.name, .owner = row.owner}));
-      return absl::OkStatus();
-    }
-    case RowName::Kind::kMesh: {
-      TF_ASSIGN_OR_RETURN(MeshRight right, rows_.FindMeshRight(row.owner, row.name));
-      found->access.mesh_rights = {std::move(right)};
-      return absl::OkStatus();
-    }
-    case RowName::Kind::kLink: {
-      TF_ASSIGN_OR_RETURN(FollowLinkRow link, rows_.FindLink(row.name));
-      const std::string session = link.session;
-      found->access.links = {std::move(link)};
-      return ReadSession(session, found);
-    }
-  }
-  return absl::NotFoundError("no such kind");
+  missing_[id] = until;  // not again at once, whether it was found or not
+  if (!absl::IsUnavailable(status)) return absl::OkStatus();
+  silent_until_ = until;
+  return status;
 }
 
 }  // namespace tissueform

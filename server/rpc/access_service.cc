@@ -113,28 +113,27 @@ grpc::ServerUnaryReactor* AccessService::WhoAmI(grpc::CallbackServerContext* con
 grpc::ServerUnaryReactor* AccessService::CreateShare(grpc::CallbackServerContext* context,
                                                      const v1::CreateShareRequest* request,
                                                      v1::Share* response) {
-  return HandleUnaryCall(context, "AccessService.CreateShare", gate_,
-                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+  return HandleStoreCall(context, "AccessService.CreateShare", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) -> absl::Status {
                            TF_ASSIGN_OR_RETURN(const ShareRow share, ToShare(request->share()));
                            *response = ToProto(share);
-                           scope.SetResource(share.resource);
-                           changes_->Share(scope.principal(), share, end);
-                           return absl::OkStatus();
+                           scope->SetResource(share.resource);
+                           return changes_->Share(scope->principal(), share);
                          });
 }
 
 grpc::ServerUnaryReactor* AccessService::ListShares(grpc::CallbackServerContext* context,
                                                     const v1::ListSharesRequest* request,
                                                     v1::ListSharesResponse* response) {
-  return HandleUnaryCall(context, "AccessService.ListShares", gate_,
-                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+  return HandleStoreCall(context, "AccessService.ListShares", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) -> absl::Status {
                            TF_ASSIGN_OR_RETURN(
                                const std::vector<ShareRow> shares,
-                               changes_->SharesOf(scope.principal(), request->resource()));
-                           scope.SetResource(request->resource());
-                           for (const ShareRow& share : shares)
+                               changes_->SharesOf(scope->principal(), request->resource()));
+                           scope->SetResource(request->resource());
+                           for (const ShareRow& share : shares) {
                              *response->add_shares() = ToProto(share);
-                           end(absl::OkStatus());
+                           }
                            return absl::OkStatus();
                          });
 }
@@ -142,50 +141,45 @@ grpc::ServerUnaryReactor* AccessService::ListShares(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* AccessService::DeleteShare(grpc::CallbackServerContext* context,
                                                      const v1::DeleteShareRequest* request,
                                                      google::protobuf::Empty* /*response*/) {
-  return HandleUnaryCall(context, "AccessService.DeleteShare", gate_,
-                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
-                           scope.SetResource(request->resource());
-                           changes_->Unshare(scope.principal(), request->resource(),
-                                             request->principal(), end);
-                           return absl::OkStatus();
+  return HandleStoreCall(context, "AccessService.DeleteShare", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) {
+                           scope->SetResource(request->resource());
+                           return changes_->Unshare(scope->principal(), request->resource(),
+                                                    request->principal());
                          });
 }
 
 grpc::ServerUnaryReactor* AccessService::CreateFollowLink(
     grpc::CallbackServerContext* context, const v1::CreateFollowLinkRequest* request,
     v1::FollowLink* response) {
-  return HandleUnaryCall(
-      context, "AccessService.CreateFollowLink", gate_,
-      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
-        const std::string token = NewLinkToken();
-        TF_ASSIGN_OR_RETURN(
-            const FollowLinkRow link,
-            ToLink(*request, token, changes_->options().max_link_lifetime, clock_()));
-        TF_RETURN_IF_ERROR(
-            AllowedSession(changes_->access(), &scope, request->session(), Permission::kWrite)
-                .status());
-        changes_->AddLink(scope.principal(), link, [=](const absl::Status& status) {
-          if (status.ok()) {
-            response->set_token(token);
-            response->mutable_expire_time()->set_seconds(link.expires_s);
-          }
-          end(status);
-        });
-        return absl::OkStatus();
-      });
+  return HandleStoreCall(
+      context, "AccessService.CreateFollowLink", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) { return MakeLink(scope, *request, response); });
+}
+
+absl::Status AccessService::MakeLink(CallScope* scope, const v1::CreateFollowLinkRequest& request,
+                                     v1::FollowLink* response) {
+  const std::string token = NewLinkToken();
+  TF_ASSIGN_OR_RETURN(const FollowLinkRow link,
+                      ToLink(request, token, changes_->options().max_link_lifetime, clock_()));
+  TF_RETURN_IF_ERROR(
+      AllowedSession(&changes_->access(), scope, request.session(), Permission::kWrite).status());
+  TF_RETURN_IF_ERROR(changes_->AddLink(scope->principal(), link));
+  response->set_token(token);
+  response->mutable_expire_time()->set_seconds(link.expires_s);
+  return absl::OkStatus();
 }
 
 grpc::ServerUnaryReactor* AccessService::DeleteFollowLinks(
     grpc::CallbackServerContext* context, const v1::DeleteFollowLinksRequest* request,
     google::protobuf::Empty* /*response*/) {
-  return HandleUnaryCall(
-      context, "AccessService.DeleteFollowLinks", gate_,
-      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+  return HandleStoreCall(
+      context, "AccessService.DeleteFollowLinks", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) -> absl::Status {
         TF_ASSIGN_OR_RETURN(
             const std::string id,
-            AllowedSession(changes_->access(), &scope, request->session(), Permission::kWrite));
-        changes_->RemoveLinks(scope.principal(), id, end);
-        return absl::OkStatus();
+            AllowedSession(&changes_->access(), scope, request->session(), Permission::kWrite));
+        return changes_->RemoveLinks(scope->principal(), id);
       });
 }
 
@@ -227,7 +221,7 @@ absl::StatusOr<std::map<std::string, v1::PrincipalUsage>> AccessService::Collect
     usage[owner].set_disk_bytes(held.bytes);
   }
   for (const std::shared_ptr<Session>& session : registry_->table().Loaded()) {
-    v1::PrincipalUsage& of_owner = usage[changes_->access().OwnerOf(session->id())];
+    v1::PrincipalUsage& of_owner = usage[registry_->table().OwnerOf(session->id())];
     of_owner.set_sessions(of_owner.sessions() + 1);
     of_owner.set_memory_bytes(of_owner.memory_bytes() + session->bytes_held());
   }

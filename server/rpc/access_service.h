@@ -51,7 +51,9 @@ class AccessService final : public v1::AccessService::CallbackService {
                                      v1::Usage* response) override;
 
  private:
-  // Both block on the store.
+  // All block on the store.
+  absl::Status MakeLink(CallScope* scope, const v1::CreateFollowLinkRequest& request,
+                        v1::FollowLink* response);
   absl::Status ReportUsage(const Principal& caller, const v1::GetUsageRequest& request,
                            v1::Usage* response) const;
   absl::StatusOr<std::map<std::string, v1::PrincipalUsage>> CollectUsage() const;

@@ -30,7 +30,7 @@ struct CasePart {
 };
 
 // Blocks on the disk.
-absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, const Access& access,
+absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, Access* access,
                                   CallScope* scope, CaseStore* store) {
   TF_ASSIGN_OR_RETURN(const CaseKey key,
                       AllowedCase(access, scope, request.name(), Permission::kRead));
@@ -88,8 +88,8 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
     call->End(call->scope().admission());
     return call;
   }
-  post([call, request, post, access = &access_, store = store_, most = limits_.max_chunk_bytes] {
-    absl::StatusOr<CasePart> part = OpenPart(*request, *access, &call->scope(), store);
+  post([call, request, post, access = access_, store = store_, most = limits_.max_chunk_bytes] {
+    absl::StatusOr<CasePart> part = OpenPart(*request, access, &call->scope(), store);
     if (!part.ok()) {
       call->End(part.status());
       return;
@@ -137,7 +137,7 @@ absl::Status CaseService::List(const v1::ListCasesRequest& request, const Princi
                                v1::ListCasesResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  TF_ASSIGN_OR_RETURN(std::set<CaseKey> shared, access_.SharedCases(caller));
+  TF_ASSIGN_OR_RETURN(std::set<CaseKey> shared, access_->SharedCases(caller));
   TF_ASSIGN_OR_RETURN(const CaseStore::Page found, store_->List({.owner = caller.name,
                                                                  .also = std::move(shared),
                                                                  .after = page.after,

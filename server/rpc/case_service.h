@@ -20,9 +20,9 @@ namespace tissueform {
 // tissueform.v1.CaseService over a store. All pointers must outlive it.
 class CaseService final : public v1::CaseService::CallbackService {
  public:
-  CaseService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  CaseService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
               CaseStore* store, WorkerPool* pool, DeadlineTimer* timer)
-      : gate_(gate), limits_(limits), access_(*access), store_(store), pool_(pool), timer_(timer) {}
+      : gate_(gate), limits_(limits), access_(access), store_(store), pool_(pool), timer_(timer) {}
 
   grpc::ServerReadReactor<v1::UploadCaseRequest>* UploadCase(
       grpc::CallbackServerContext* context, v1::UploadCaseResponse* response) override;
@@ -46,7 +46,7 @@ class CaseService final : public v1::CaseService::CallbackService {
   // Constant.
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   CaseStore* const store_;
   WorkerPool* const pool_;
   DeadlineTimer* const timer_;

@@ -116,7 +116,7 @@ absl::StatusOr<ExportRecord> ExportService::Wanted(CallScope* scope,
   }
   TF_RETURN_IF_ERROR(CheckMeasures(request.measures()));
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.prediction(), Permission::kOwner));
+                      AllowedPrediction(access_, scope, request.prediction(), Permission::kOwner));
   TF_ASSIGN_OR_RETURN(const PredictionRecord prediction, predictions_->Get(id));
   if (prediction.case_sha256.empty()) {
     return absl::FailedPreconditionError(
@@ -136,7 +136,7 @@ absl::Status ExportService::Create(CallScope* scope, const v1::CreateExportReque
   TF_ASSIGN_OR_RETURN(ExportRecord wanted, Wanted(scope, request));
   TF_ASSIGN_OR_RETURN(const ExportRecord made, book_->Create(std::move(wanted)));
   // It may have gone between the two, and found no export that goes with it.
-  if (!access_->KnowsPrediction(made.prediction)) {
+  if (absl::IsNotFound(predictions_->Get(made.prediction).status())) {
     TF_RETURN_IF_ERROR(book_->RemoveOf(made.prediction));
     return NoPrediction(made.prediction);
   }

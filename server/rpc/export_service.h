@@ -20,7 +20,7 @@ namespace tissueform {
 // tissueform.v1.ExportService over a book. Stateless; all pointers must outlive it.
 class ExportService final : public v1::ExportService::CallbackService {
  public:
-  ExportService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  ExportService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
                 PredictionStore* predictions, ExportQueue* book, ExportWatches* watches,
                 WorkerPool* pool, DeadlineTimer* timer)
       : gate_(gate),
@@ -65,7 +65,7 @@ class ExportService final : public v1::ExportService::CallbackService {
 
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access* const access_;
+  Access* const access_;
   PredictionStore* const predictions_;
   ExportQueue* const book_;
   ExportWatches* const watches_;

@@ -34,11 +34,11 @@ constexpr size_t kPageBytes = size_t{2} << 20;
 // One CreatePrediction call. Deletes itself when gRPC is done with it.
 class CreatePredictionCall : public grpc::ServerUnaryReactor {
  public:
-  CreatePredictionCall(CallScope scope, const Access* access, SessionRegistry* registry,
+  CreatePredictionCall(CallScope scope, Access* access, SessionRegistry* registry,
                        PredictionStore* store, const v1::CreatePredictionRequest* request,
                        v1::Prediction* response)
       : scope_(std::move(scope)),
-        access_(*access),
+        access_(access),
         registry_(registry),
         store_(store),
         request_(*request),
@@ -102,7 +102,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
     absl::Status allowed =
         AllowedSession(access_, &scope_, request_.session(), Permission::kWrite).status();
     if (allowed.ok())
-      allowed = access_.CheckStorageQuota(scope_.principal(), 1);  // before the work
+      allowed = access_->CheckStorageQuota(scope_.principal(), 1);  // before the work
     if (!allowed.ok()) {
       End(allowed);
       return;
@@ -120,7 +120,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   }
 
   absl::Status Keep() {
-    TF_RETURN_IF_ERROR(access_.CheckStorageQuota(scope_.principal(),
+    TF_RETURN_IF_ERROR(access_->CheckStorageQuota(scope_.principal(),
                                                  static_cast<int64_t>(keep_.positions.size())));
     const absl::Status kept = store_->Create(keep_.record, keep_.positions);
     // The same request twice at once: the other one was first.
@@ -134,7 +134,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
 
   CallScope scope_;
-  const Access& access_;
+  Access* const access_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;
   const v1::CreatePredictionRequest& request_;
@@ -146,8 +146,10 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
 };
 
 // The positions from the request's offset on. Blocks on the disk.
-absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request, const std::string& id,
-                                     PredictionStore* store) {
+absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request, Access* access,
+                                     CallScope* scope, PredictionStore* store) {
+  TF_ASSIGN_OR_RETURN(const std::string id,
+                      AllowedPrediction(access, scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(std::string positions, store->Positions(id));
   const auto size = static_cast<int64_t>(positions.size());
   if (request.read_offset() < 0 || request.read_offset() > size) {
@@ -179,14 +181,8 @@ grpc::ServerWriteReactor<v1::ReadPositionsResponse>* PredictionService::ReadPosi
     call->End(call->scope().admission());
     return call;
   }
-  absl::StatusOr<std::string> id =
-      AllowedPrediction(*access_, &call->scope(), request->name(), Permission::kRead);
-  if (!id.ok()) {
-    call->End(id.status());
-    return call;
-  }
-  registry_->pool().Post(Lane::kStore, [call, request, id = *std::move(id), store = store_] {
-    absl::StatusOr<std::string> positions = ReadFrom(*request, id, store);
+  registry_->pool().Post(Lane::kStore, [call, request, access = access_, store = store_] {
+    absl::StatusOr<std::string> positions = ReadFrom(*request, access, &call->scope(), store);
     if (!positions.ok()) {
       call->End(positions.status());
       return;
@@ -232,7 +228,7 @@ grpc::ServerUnaryReactor* PredictionService::DeletePrediction(
 absl::Status PredictionService::Find(CallScope* scope, const v1::GetPredictionRequest& request,
                                      v1::Prediction* response) {
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.name(), Permission::kRead));
+                      AllowedPrediction(access_, scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const PredictionRecord record, store_->Get(id));
   TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
   *response = std::move(kept.prediction);
@@ -274,7 +270,7 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
 absl::Status PredictionService::Remove(CallScope* scope,
                                        const v1::DeletePredictionRequest& request) {
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.name(), Permission::kOwner));
+                      AllowedPrediction(access_, scope, request.name(), Permission::kOwner));
   TF_RETURN_IF_ERROR(store_->Delete(id));
   // In memory its exports are gone; after a restart there is no prediction of those on the disk.
   if (!exports_->RemoveOf(id).ok()) spdlog::warn("exports of a removed prediction remain on disk");

@@ -20,7 +20,7 @@ namespace tissueform {
 // tissueform.v1.PredictionService over a store. Stateless; all pointers must outlive it.
 class PredictionService final : public v1::PredictionService::CallbackService {
  public:
-  PredictionService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  PredictionService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
                     MeshCatalog* catalog, SessionRegistry* registry, PredictionStore* store,
                     ExportQueue* exports, DeadlineTimer* timer)
       : gate_(gate),
@@ -58,7 +58,7 @@ class PredictionService final : public v1::PredictionService::CallbackService {
 
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access* const access_;
+  Access* const access_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;

@@ -21,12 +21,12 @@ namespace tissueform {
 // tissueform.v1.SessionService over a registry. Stateless; all pointers must outlive it.
 class SessionService final : public v1::SessionService::CallbackService {
  public:
-  SessionService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  SessionService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
                  MeshCatalog* catalog, SessionRegistry* registry,
                  const Clock* clock = Clock::System())
       : gate_(gate),
         limits_(limits),
-        access_(*access),
+        access_(access),
         catalog_(catalog),
         registry_(registry),
         clock_(clock) {}
@@ -56,7 +56,7 @@ class SessionService final : public v1::SessionService::CallbackService {
 
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   const Clock* const clock_;

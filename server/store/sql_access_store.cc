@@ -3,121 +3,172 @@
 
 #include "server/store/sql_access_store.h"
 
-#include <string>
 #include <utility>
-#include <vector>
+
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 
 #include "core/base/status_macros.h"
-#include "server/store/access_rows.h"
-#include "server/store/store_index.h"
+#include "server/store/access_queries.h"
 #include "server/store/store_records.h"
 
 namespace tissueform {
 namespace {
 
-struct Statements {
-  const char* select;
-  const char* find;
-  const char* erase;
-  const char* put;
-};
-// Parameters of `put` are the key, the record, and the columns of IndexOf.
-#define TF_ACCESS_STATEMENTS(table, columns, parameters)                                         \
-  {                                                                                              \
-    "SELECT name, record FROM " table " ORDER BY name",                                          \
-        "SELECT record FROM " table " WHERE name = $1", "DELETE FROM " table " WHERE name = $1", \
-        "INSERT INTO " table " (name, record, " columns ") VALUES ($1, $2, " parameters          \
-        ") ON CONFLICT (name) DO UPDATE SET record = excluded.record"                            \
-  }
-constexpr Statements kShares =
-    TF_ACCESS_STATEMENTS("shares", "owner, resource, principal", "$3, $4, $5");
-// A link never changes, and neither do the bytes of a mesh.
-constexpr Statements kLinks =
-    TF_ACCESS_STATEMENTS("follow_links", "session, maker, expires_s", "$3, $4, $5");
-constexpr Statements kMeshRights =
-    TF_ACCESS_STATEMENTS("mesh_rights", "principal, sha256, bytes", "$3, $4, $5");
-#undef TF_ACCESS_STATEMENTS
+absl::Status NoRoom() { return absl::ResourceExhaustedError("too many rows of rights"); }
 
-template <typename Row>
-absl::Status LoadRows(SqlTransaction& transaction, const Statements& statements,
-                      std::vector<Row>* loaded) {
-  TF_ASSIGN_OR_RETURN(const SqlRows rows, transaction.Query(statements.select, {}));
-  for (size_t i = 0; i < rows.size(); ++i) {
-    Row row;
-    const absl::StatusOr<absl::string_view> bytes = Unseal(rows.Text(i, 1));
-    if (!bytes.ok() || !ParseRow(*bytes, &row).ok() || KeyOf(row) != rows.Text(i, 0)) continue;
-    loaded->push_back(std::move(row));
-  }
-  return absl::OkStatus();
+absl::Status Write(SqlDatabase* database, SqlWork work, bool erases = false) {
+  return database->Run({.work = std::move(work), .repeatable = true, .erases = erases});
 }
 
-template <typename Row>
-absl::Status ChangeRows(SqlTransaction& transaction, const Statements& statements,
-                        const std::vector<Row>& erase, const std::vector<Row>& put) {
-  for (const Row& row : erase) {
-    TF_RETURN_IF_ERROR(transaction.Run(statements.erase, {KeyOf(row)}));
+absl::Status NoSuchRow() { return absl::NotFoundError("no such row"); }
+
+// Locks the row of the resource, so that it is not deleted until the transaction ends. Errors:
+// NotFound.
+absl::Status LockResource(SqlTransaction& transaction, const ShareRow& share) {
+  absl::string_view name = share.resource;
+  const char* select = nullptr;
+  if (absl::ConsumePrefix(&name, "sessions/")) {
+    select = "SELECT 1 FROM sessions WHERE id = $1 AND owner = $2 FOR UPDATE";
+  } else if (absl::ConsumePrefix(&name, "predictions/")) {
+    select = "SELECT 1 FROM predictions WHERE id = $1 AND owner = $2 FOR UPDATE";
+  } else if (absl::ConsumePrefix(&name, "cases/")) {
+    select = "SELECT 1 FROM cases WHERE sha256 = $1 AND owner = $2 FOR UPDATE";
+  } else {
+    return absl::OkStatus();
   }
-  for (const Row& row : put) {
-    const std::string key = KeyOf(row);
-    const std::string record = Seal(SerializeRow(row));
-    std::vector<SqlValue> values = {key, SqlBytes{record}};
-    for (const SqlValue& value : IndexOf(row)) values.push_back(value);
-    TF_RETURN_IF_ERROR(transaction.Run(statements.put, values));
-  }
-  return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const SqlRows rows, transaction.Query(select, {name, share.owner}));
+  return rows.empty() ? NoSuchRow() : absl::OkStatus();
 }
 
-template <typename Row>
-absl::StatusOr<Row> FindRow(SqlDatabase* database, const Statements& statements,
-                            const Row& wanted) {
-  const std::string key = KeyOf(wanted);
-  return ReadSql<Row>(database, [&](SqlTransaction& transaction) -> absl::StatusOr<Row> {
-    TF_ASSIGN_OR_RETURN(const SqlRows rows, transaction.Query(statements.find, {key}));
-    if (rows.empty()) return absl::NotFoundError("no such access right");
-    TF_ASSIGN_OR_RETURN(const absl::string_view bytes, Unseal(rows.Text(0, 0)));
-    Row row;
-    TF_RETURN_IF_ERROR(ParseRow(bytes, &row));
-    if (KeyOf(row) != key) return absl::DataLossError("an access right is another's");
-    return row;
-  });
+absl::Status CheckShareRoom(SqlTransaction& transaction, const ShareRow& share, int most) {
+  TF_ASSIGN_OR_RETURN(
+      const SqlRows rows,
+      transaction.Query("SELECT count(*) FROM shares WHERE resource = $1 AND owner = $2 AND "
+                        "principal <> $3",
+                        {share.resource, share.owner, share.principal}));
+  return rows.Integer(0, 0) < most ? absl::OkStatus() : NoRoom();
+}
+
+absl::Status InsertShare(SqlTransaction& transaction, const ShareRow& share) {
+  const std::string key = KeyOf(share);
+  const std::string record = Seal(SerializeRow(share));
+  return transaction.Run(
+      "INSERT INTO shares (name, record, owner, resource, principal) VALUES ($1, $2, $3, $4, $5) "
+      "ON CONFLICT (name) DO UPDATE SET record = excluded.record",
+      {key, SqlBytes{record}, share.owner, share.resource, share.principal});
+}
+
+absl::Status InsertLink(SqlTransaction& transaction, const FollowLinkRow& link) {
+  const std::string record = Seal(SerializeRow(link));
+  return transaction.Run(
+      "INSERT INTO follow_links (name, record, session, maker, expires_s) VALUES ($1, $2, $3, $4, "
+      "$5) ON CONFLICT (name) DO UPDATE SET record = excluded.record",
+      {link.digest, SqlBytes{record}, link.session, link.maker, link.expires_s});
+}
+
+absl::Status CheckLinkRoom(SqlTransaction& transaction, const std::string& session, int most) {
+  TF_ASSIGN_OR_RETURN(
+      const SqlRows found,
+      transaction.Query("SELECT 1 FROM sessions WHERE id = $1 FOR UPDATE", {session}));
+  if (found.empty()) return NoSuchRow();
+  TF_ASSIGN_OR_RETURN(
+      const SqlRows links,
+      transaction.Query("SELECT count(*) FROM follow_links WHERE session = $1", {session}));
+  return links.Integer(0, 0) < most ? absl::OkStatus() : NoRoom();
 }
 
 }  // namespace
 
-absl::StatusOr<FollowLinkRow> SqlAccessStore::FindLink(const std::string& digest) {
-  return FindRow<FollowLinkRow>(database_, kLinks, {.digest = digest});
+absl::StatusOr<std::vector<ShareRow>> SqlAccessStore::SharesOf(const std::string& owner,
+                                                               const std::string& resource) {
+  TF_ASSIGN_OR_RETURN(
+      const SqlRows rows, ReadSql<SqlRows>(database_, [&](SqlTransaction& transaction) {
+        return transaction.Query(
+            "SELECT name, record FROM shares WHERE resource = $1 AND owner = $2 ORDER BY principal",
+            {resource, owner});
+      }));
+  std::vector<ShareRow> shares;
+  for (size_t row = 0; row < rows.size(); ++row) {
+    ShareRow share;
+    const absl::StatusOr<absl::string_view> bytes = Unseal(rows.Text(row, 1));
+    if (!bytes.ok() || !ParseRow(*bytes, &share).ok() || KeyOf(share) != rows.Text(row, 0)) continue;
+    shares.push_back(std::move(share));
+  }
+  return shares;
 }
 
-absl::StatusOr<MeshRight> SqlAccessStore::FindMeshRight(const std::string& principal,
-                                                        const std::string& sha256) {
-  return FindRow<MeshRight>(database_, kMeshRights, {.principal = principal, .sha256 = sha256});
+absl::Status SqlAccessStore::PutShare(const ShareRow& share, int most) {
+  return Write(database_, [&](SqlTransaction& transaction) -> absl::Status {
+    TF_RETURN_IF_ERROR(LockResource(transaction, share));
+    TF_RETURN_IF_ERROR(CheckShareRoom(transaction, share, most));
+    return InsertShare(transaction, share);
+  });
 }
 
-absl::StatusOr<AccessRows> SqlAccessStore::Load() {
-  return ReadSql<AccessRows>(
-      database_, [](SqlTransaction& transaction) -> absl::StatusOr<AccessRows> {
-        AccessRows rows;
-        TF_RETURN_IF_ERROR(transaction.ReadOneMoment());
-        TF_RETURN_IF_ERROR(LoadRows(transaction, kShares, &rows.shares));
-        TF_RETURN_IF_ERROR(LoadRows(transaction, kLinks, &rows.links));
-        TF_RETURN_IF_ERROR(LoadRows(transaction, kMeshRights, &rows.mesh_rights));
-        return rows;
-      });
-}
-
-void SqlAccessStore::Change(AccessRows erase, AccessRows put,
-                            std::function<void(absl::Status)> done) {
-  const bool erases = !erase.shares.empty() || !erase.links.empty() || !erase.mesh_rights.empty();
-  database_->Submit(
-      "",
-      {.work = [erase = std::move(erase),
-                put = std::move(put)](SqlTransaction& transaction) -> absl::Status {
-         TF_RETURN_IF_ERROR(ChangeRows(transaction, kShares, erase.shares, put.shares));
-         TF_RETURN_IF_ERROR(ChangeRows(transaction, kLinks, erase.links, put.links));
-         return ChangeRows(transaction, kMeshRights, erase.mesh_rights, put.mesh_rights);
+absl::Status SqlAccessStore::EraseShare(const ShareRow& share) {
+  const std::string key = KeyOf(share);
+  // Not repeatable: a second run would find no share.
+  return database_->Run(
+      {.work = [&](SqlTransaction& transaction) -> absl::Status {
+         TF_ASSIGN_OR_RETURN(
+             const SqlRows rows,
+             transaction.Query("DELETE FROM shares WHERE name = $1 RETURNING key", {key}));
+         return rows.empty() ? NoSuchRow() : absl::OkStatus();
        },
-       .erases = erases},
-      std::move(done));
+       .erases = true});
 }
+
+absl::Status SqlAccessStore::PutLink(const FollowLinkRow& link, int64_t now_s, int most) {
+  return Write(
+      database_,
+      [&](SqlTransaction& transaction) -> absl::Status {
+        TF_RETURN_IF_ERROR(
+            transaction.Run("DELETE FROM follow_links WHERE expires_s <= $1", {now_s}));
+        TF_RETURN_IF_ERROR(CheckLinkRoom(transaction, link.session, most));
+        return InsertLink(transaction, link);
+      },
+      /*erases=*/true);
+}
+
+absl::Status SqlAccessStore::EraseLinks(const std::string& session) {
+  return Write(
+      database_,
+      [&](SqlTransaction& transaction) {
+        return transaction.Run("DELETE FROM follow_links WHERE session = $1", {session});
+      },
+      /*erases=*/true);
+}
+
+absl::Status SqlAccessStore::PutMeshRight(const MeshRight& right) {
+  const std::string key = KeyOf(right);
+  const std::string record = Seal(SerializeRow(right));
+  return Write(database_, [&](SqlTransaction& transaction) {
+    return transaction.Run(
+        "INSERT INTO mesh_rights (name, record, principal, sha256, bytes) VALUES ($1, $2, $3, $4, "
+        "$5) ON CONFLICT (name) DO UPDATE SET record = excluded.record, bytes = excluded.bytes",
+        {key, SqlBytes{record}, right.principal, right.sha256, right.bytes});
+  });
+}
+
+absl::Status SqlAccessStore::EraseMeshRight(const std::string& principal,
+                                            const std::string& sha256) {
+  const std::string key = KeyOf(MeshRight{.principal = principal, .sha256 = sha256});
+  return Write(
+      database_,
+      [&](SqlTransaction& transaction) {
+        return transaction.Run("DELETE FROM mesh_rights WHERE name = $1", {key});
+      },
+      /*erases=*/true);
+}
+
+absl::Status SqlAccessStore::EraseMeshRights(const std::string& sha256) {
+  return Write(
+      database_,
+      [&](SqlTransaction& transaction) { return EraseAccessToMesh(transaction, sha256); },
+      /*erases=*/true);
+}
+
+bool HasNoRoom(const absl::Status& status) { return status == NoRoom(); }
 
 }  // namespace tissueform

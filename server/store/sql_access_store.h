@@ -3,32 +3,49 @@
 
 #pragma once
 
-#include <functional>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/store/access_store.h"
+#include "server/store/access_rows.h"
 #include "server/store/sql_database.h"
 
 namespace tissueform {
 
-// Rows by their keys. A change is kept in the order of the calls.
-class SqlAccessStore : public AccessStore {
+// Changes rows of rights; access_queries.h finds them. All block and are durable when they return.
+// Thread-safe. Errors, where none is named: those of SqlDatabase.
+class SqlAccessStore {
  public:
   // `database` must outlive it.
   explicit SqlAccessStore(SqlDatabase* database) : database_(database) {}
 
-  absl::StatusOr<AccessRows> Load() override;
-  void Change(AccessRows erase, AccessRows put, std::function<void(absl::Status)> done) override;
+  // Of one resource of the owner's, by principal, rising. Damaged rows are left out.
+  absl::StatusOr<std::vector<ShareRow>> SharesOf(const std::string& owner,
+                                                 const std::string& resource);
 
-  // One row. Block. Errors: NotFound; DataLoss: it is damaged.
-  absl::StatusOr<FollowLinkRow> FindLink(const std::string& digest);
-  absl::StatusOr<MeshRight> FindMeshRight(const std::string& principal, const std::string& sha256);
+  // In place of the share with its key. Errors: NotFound (its owner has no such resource; a project
+  // needs none), ResourceExhausted (HasNoRoom: it would be one more than `most` of the resource).
+  absl::Status PutShare(const ShareRow& share, int most);
+  // Errors: NotFound.
+  absl::Status EraseShare(const ShareRow& share);
+
+  // Erases links that have expired, too. Errors: NotFound (the session is gone), ResourceExhausted
+  // (HasNoRoom: it would be one more than `most` of the session).
+  absl::Status PutLink(const FollowLinkRow& link, int64_t now_s, int most);
+  absl::Status EraseLinks(const std::string& session);
+
+  absl::Status PutMeshRight(const MeshRight& right);
+  absl::Status EraseMeshRight(const std::string& principal, const std::string& sha256);
+  absl::Status EraseMeshRights(const std::string& sha256);
 
  private:
   SqlDatabase* const database_;
 };
+
+// Whether a Put was refused for its `most`, and not for a full disk.
+bool HasNoRoom(const absl::Status& status);
 
 }  // namespace tissueform

@@ -114,6 +114,8 @@ class CallScope {
     return gate_ != nullptr && gate_->checks().authenticator != nullptr;
   }
   absl::Status IsStillAuthorized() const;
+  // The same as a function that needs no scope any more.
+  std::function<absl::Status()> AuthorizationQuestion() const;
 
   // Says what the call is about ("sessions/{id}"), once it is known that its caller may use it.
   void SetResource(std::string resource);
@@ -146,6 +148,12 @@ using FinishCall = std::function<void(const absl::Status& outcome)>;
 grpc::ServerUnaryReactor* HandleUnaryCall(
     grpc::CallbackServerContext* context, std::string_view method, AdmissionControl* gate,
     const std::function<absl::Status(CallScope& scope, const FinishCall& end)>& start);
+
+// The same, but `start` runs in the lane.
+grpc::ServerUnaryReactor* HandleUnaryCallIn(
+    Lane lane, WorkerPool* pool, grpc::CallbackServerContext* context, std::string_view method,
+    AdmissionControl* gate,
+    std::function<absl::Status(CallScope& scope, const FinishCall& end)> start);
 
 // The same for a call that waits for the store: `work` runs in Lane::kStore of `pool`, and its
 // status ends the call. `work` must not keep `scope`.
