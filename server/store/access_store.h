@@ -27,8 +27,8 @@ class AccessStore {
  public:
   virtual ~AccessStore() = default;
 
-  // All rows, of each kind by its key, rising. Damaged ones are passed over: nobody may more by
-  // damage. Blocks. Errors: what the disk says.
+  // All rows, of each kind by its key, rising. Damaged ones are left out: damage never
+  // grants access. Blocks. Errors: what the disk says.
   virtual absl::StatusOr<AccessRows> Load() = 0;
 
   // Takes rows out by their keys, then puts rows in, in place of those with their keys; all or
