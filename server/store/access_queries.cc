@@ -39,7 +39,7 @@ bool ReadSealedRow(absl::string_view key, absl::string_view sealed, Row* row) {
   return bytes.ok() && ParseRow(*bytes, row).ok() && KeyOf(*row) == key;
 }
 
-// The role of a joined share; `sealed` is empty where there is none.
+// The role of a joined share. Without a share, `sealed` is empty.
 std::optional<ShareRole> RoleOf(absl::string_view sealed, absl::string_view owner,
                                 const std::string& resource, absl::string_view principal) {
   if (sealed.empty()) return std::nullopt;
@@ -95,6 +95,17 @@ void ForEachShared(const SqlRows& rows, size_t share, absl::string_view principa
       take(row);
     }
   }
+}
+
+// `sql` returns the name, owner, resource and record of resources shared with $1.
+absl::StatusOr<std::set<std::string>> SharedNames(SqlDatabase* database, const char* sql,
+                                                  const std::string& principal) {
+  TF_ASSIGN_OR_RETURN(const SqlRows rows, Ask(database, sql, {principal}));
+  std::set<std::string> shared;
+  ForEachShared(rows, 1, principal, [&](size_t row) {
+    if (rows.Text(row, 1) != principal) shared.emplace(rows.Text(row, 0));
+  });
+  return shared;
 }
 
 std::set<std::string> NamesIn(const SqlRows& rows) {
@@ -261,41 +272,29 @@ absl::StatusOr<std::set<std::string>> AccessQueries::MeshesNear(const std::strin
 
 absl::StatusOr<std::set<std::string>> AccessQueries::SharedSessions(const std::string& principal) {
   // The lengths of "sessions/" and "projects/" are 9.
-  TF_ASSIGN_OR_RETURN(
-      const SqlRows rows,
-      Ask(database_,
-          "SELECT s.id, h.owner, h.resource, h.record FROM shares h JOIN sessions s ON s.id = "
-          "substr(h.resource, 10) AND s.owner = h.owner WHERE h.principal = $1 AND "
-          "substr(h.resource, 1, 9) = 'sessions/' "
-          "UNION ALL SELECT s.id, h.owner, h.resource, h.record FROM shares h JOIN sessions s ON "
-          "s.owner = h.owner AND s.project = substr(h.resource, 10) WHERE h.principal = $1 AND "
-          "substr(h.resource, 1, 9) = 'projects/'",
-          {principal}));
-  std::set<std::string> shared;
-  ForEachShared(rows, 1, principal, [&](size_t row) {
-    if (rows.Text(row, 1) != principal) shared.emplace(rows.Text(row, 0));
-  });
-  return shared;
+  return SharedNames(
+      database_,
+      "SELECT s.id, h.owner, h.resource, h.record FROM shares h JOIN sessions s ON s.id = "
+      "substr(h.resource, 10) AND s.owner = h.owner WHERE h.principal = $1 AND "
+      "substr(h.resource, 1, 9) = 'sessions/' "
+      "UNION ALL SELECT s.id, h.owner, h.resource, h.record FROM shares h JOIN sessions s ON "
+      "s.owner = h.owner AND s.project = substr(h.resource, 10) WHERE h.principal = $1 AND "
+      "substr(h.resource, 1, 9) = 'projects/'",
+      principal);
 }
 
 absl::StatusOr<std::set<std::string>> AccessQueries::SharedPredictions(
     const std::string& principal) {
   // The length of "predictions/" is 12.
-  TF_ASSIGN_OR_RETURN(
-      const SqlRows rows,
-      Ask(database_,
-          "SELECT p.id, h.owner, h.resource, h.record FROM shares h JOIN predictions p ON p.id = "
-          "substr(h.resource, 13) AND p.owner = h.owner WHERE h.principal = $1 AND "
-          "substr(h.resource, 1, 12) = 'predictions/' "
-          "UNION ALL SELECT p.id, h.owner, h.resource, h.record FROM shares h JOIN sessions s ON "
-          "s.owner = h.owner AND h.resource IN ('sessions/' || s.id, 'projects/' || s.project) "
-          "JOIN predictions p ON p.session = s.id AND p.owner = s.owner WHERE h.principal = $1",
-          {principal}));
-  std::set<std::string> shared;
-  ForEachShared(rows, 1, principal, [&](size_t row) {
-    if (rows.Text(row, 1) != principal) shared.emplace(rows.Text(row, 0));
-  });
-  return shared;
+  return SharedNames(
+      database_,
+      "SELECT p.id, h.owner, h.resource, h.record FROM shares h JOIN predictions p ON p.id = "
+      "substr(h.resource, 13) AND p.owner = h.owner WHERE h.principal = $1 AND "
+      "substr(h.resource, 1, 12) = 'predictions/' "
+      "UNION ALL SELECT p.id, h.owner, h.resource, h.record FROM shares h JOIN sessions s ON "
+      "s.owner = h.owner AND h.resource IN ('sessions/' || s.id, 'projects/' || s.project) "
+      "JOIN predictions p ON p.session = s.id AND p.owner = s.owner WHERE h.principal = $1",
+      principal);
 }
 
 absl::StatusOr<std::set<CaseKey>> AccessQueries::SharedCases(const std::string& principal) {

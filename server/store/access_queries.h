@@ -57,7 +57,7 @@ struct Holdings {
 // What a store says of who may do what, by the indexed columns beside its records
 // (store_schema.h). Each answer was true at one moment.
 //
-// A row of rights counts only while its seal holds: damage gives nobody more. All block.
+// A row of rights counts only while its seal holds: damage never grants access. All block.
 // Thread-safe. Errors: those of SqlDatabase.
 class AccessQueries {
  public:

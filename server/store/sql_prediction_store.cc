@@ -18,8 +18,6 @@
 namespace tissueform {
 namespace {
 
-constexpr int64_t kVertexBytes = 12;
-
 absl::StatusOr<PredictionRow> FindRow(SqlTransaction& transaction, const std::string& id) {
   TF_ASSIGN_OR_RETURN(const SqlRows rows,
                       transaction.Query(TF_SELECT_PREDICTIONS "WHERE id = $1", {id}));

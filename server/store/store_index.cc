@@ -17,7 +17,6 @@ namespace {
 
 // Bounds memory: a session's record may have megabytes.
 constexpr int64_t kRowsAtOnce = 100;
-constexpr int64_t kVertexBytes = 3 * int64_t{sizeof(float)};
 
 // `select` returns key and record of $2 rows with keys greater than $1, in their order. `update`
 // gets what `index` finds in the record, then the key.

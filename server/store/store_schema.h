@@ -31,9 +31,9 @@ namespace tissueform {
 //   exports         name, record, version: what is to go to the PACS (server/exports); version 0:
 //                   written before version 6
 //
-// Version 1 had neither times nor predictions, version 2 no cases, version 3 one owner a case, and
-// nobody had a right; version 4 had no exports, version 5 no meshes of sessions,
-// version 6 no columns for access_queries.h.
+// Version 1 had neither times nor predictions, version 2 no cases, version 3 one owner a case and
+// no rights, version 4 no exports, version 5 no meshes of sessions, version 6 no columns for
+// access_queries.h.
 inline constexpr int64_t kSchemaVersion = 7;
 
 // Describes a table for code that copies rows.

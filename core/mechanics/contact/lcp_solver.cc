@@ -182,10 +182,9 @@ void LcpSolver::CollectViolations() {
 // Active violating rows become inactive and inactive ones active.
 void LcpSolver::Exchange(size_t first_violation) {
   exchanged_.clear();
-  std::set_symmetric_difference(
-      solution_.active.begin(), solution_.active.end(),
-      violations_.begin() + static_cast<std::ptrdiff_t>(first_violation), violations_.end(),
-      std::back_inserter(exchanged_));
+  std::set_symmetric_difference(solution_.active.begin(), solution_.active.end(),
+                                violations_.begin() + static_cast<std::ptrdiff_t>(first_violation),
+                                violations_.end(), std::back_inserter(exchanged_));
   solution_.active.swap(exchanged_);
 }
 

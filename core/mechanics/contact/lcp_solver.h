@@ -39,9 +39,9 @@ struct LcpSolution {
 //   g = q + C l,   g >= 0,   l >= 0,   l_i g_i = 0 for every row i,
 //
 // with C the compliance of the rows (mm of gap per unit of multiplier), q the gaps in mm that the
-// rows would have without contact. C is positive definite, so there is one solution. The multipliers
-// come from a direct solve on the active rows in rising order: they are a function of q and of the
-// active set alone, to the last bit, whatever the solver started from and solved before.
+// rows would have without contact. C is positive definite, so there is one solution. The
+// multipliers come from a direct solve on the active rows in rising order: they are a function of q
+// and of the active set alone, to the last bit, for any start and any earlier calls.
 //
 // The primal-dual active set (Hintermueller, Ito, Kunisch 2002) exchanges all rows that violate a
 // condition at once. If that stops reducing their number, it exchanges one row at a time, which

@@ -147,8 +147,8 @@ ALTER TABLE mesh_rights ADD COLUMN principal text COLLATE "C" NOT NULL DEFAULT '
 CREATE INDEX mesh_rights_by_principal ON mesh_rights(principal);
 CREATE INDEX mesh_rights_by_sha256 ON mesh_rights(sha256);
 
--- By row: whoever deletes a resource deletes its rights, mostly none, of which nobody need hear.
--- PostgreSQL tells equal notices of one transaction once.
+-- By row: deleting a resource deletes its rights, and without rights there is no change to report.
+-- PostgreSQL sends equal notices of one transaction once.
 DROP TRIGGER tell_changed ON shares;
 CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON shares FOR EACH ROW
   EXECUTE FUNCTION tissueform_tell('access_changed');

@@ -305,7 +305,7 @@ TEST_F(AccessTest, WhatIsKeptCountsForItsOwner) {
   EXPECT_THAT(access_.CheckStorageQuota(ann_, 100 - bytes), IsOk());
   EXPECT_THAT(access_.CheckStorageQuota(ann_, 101 - bytes), StatusIs(Code::kResourceExhausted));
   EXPECT_THAT(access_.CheckStorageQuota(bob_, 100), IsOk());
-  EXPECT_THAT(access_.CheckStorageQuota(nobody_, 1000), IsOk()) << "nobody logs in";
+  EXPECT_THAT(access_.CheckStorageQuota(nobody_, 1000), IsOk()) << "without logins";
 }
 
 TEST_F(AccessTest, OnlyAProjectOfTheTokenTakesNewResources) {

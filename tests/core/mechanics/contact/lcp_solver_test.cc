@@ -171,8 +171,7 @@ TEST(LcpSolverTest, NearlyDependentRowsKeepTheirOrder) {
     rows.row(row) = RandomVector(12, &random);
     rows.row(row + 1) = rows.row(row) + 1e-6 * RandomVector(12, &random).transpose();
   }
-  const Eigen::MatrixXd C =
-      rows * rows.transpose() + 1e-12 * Eigen::MatrixXd::Identity(20, 20);
+  const Eigen::MatrixXd C = rows * rows.transpose() + 1e-12 * Eigen::MatrixXd::Identity(20, 20);
   for (int trial = 0; trial < 40; ++trial) {
     Eigen::VectorXd q = RandomVector(20, &random);
     for (Eigen::Index row = 0; row < 20; row += 2) q[row + 1] = q[row] + 0.3 * random.Next();
