@@ -109,12 +109,6 @@ absl::Status ChangeFollower::Apply(const StoreChange& change) {
       return rooms_.exports->ReloadRows();
     case Kind::kMissed:
       return ResyncAll();
-    case Kind::kPredictionCreated:
-    case Kind::kPredictionDeleted:
-    case Kind::kCaseCreated:
-    case Kind::kCaseDeleted:
-    case Kind::kAccessChanged:
-      break;  // nobody keeps a copy
   }
   return absl::OkStatus();
 }

@@ -49,7 +49,7 @@ void Cluster::Join(ClusterListeners rooms) {
   rooms_ = rooms;
   rooms.exports->set_read_gate(
       [this](const std::string& id, const std::function<absl::Status()>& read) {
-        return lookups_.ReadForExport(id, read);
+        return lookups_.Read(id, read);
       });
   rooms.sessions->loader().set_naming_room(
       [this](const absl::Status& refusal) { return node_.NamingRoom(refusal); });

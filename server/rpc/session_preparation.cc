@@ -59,7 +59,9 @@ void SessionPreparation::Start(const absl::Status& admission, const Principal& c
     Finish(admission);
     return;
   }
-  registry_->pool().Post(Lane::kStore, [self = shared_from_this(), caller] {
+  // A creation reads a mesh here; the others only ask, and must not wait behind such reads.
+  const Lane lane = request_.has_create() ? Lane::kStore : Lane::kLeases;
+  registry_->pool().Post(lane, [self = shared_from_this(), caller] {
     if (*self->cancelled_) return;
     absl::Status begun = self->Authorize(caller);
     if (begun.ok()) begun = self->Begin(caller);

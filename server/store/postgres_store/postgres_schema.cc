@@ -146,18 +146,19 @@ ALTER TABLE mesh_rights ADD COLUMN principal text COLLATE "C" NOT NULL DEFAULT '
   ADD COLUMN bytes bigint NOT NULL DEFAULT 0;
 CREATE INDEX mesh_rights_by_principal ON mesh_rights(principal);
 CREATE INDEX mesh_rights_by_sha256 ON mesh_rights(sha256);
+)sql";
 
--- By row: deleting a resource deletes its rights, and without rights there is no change to report.
--- PostgreSQL sends equal notices of one transaction once.
-DROP TRIGGER tell_changed ON shares;
-CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON shares FOR EACH ROW
-  EXECUTE FUNCTION tissueform_tell('access_changed');
-DROP TRIGGER tell_changed ON follow_links;
-CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON follow_links FOR EACH ROW
-  EXECUTE FUNCTION tissueform_tell('access_changed');
-DROP TRIGGER tell_changed ON mesh_rights;
-CREATE TRIGGER tell_changed AFTER INSERT OR UPDATE OR DELETE ON mesh_rights FOR EACH ROW
-  EXECUTE FUNCTION tissueform_tell('access_changed');
+// Servers ask for rights, cases and predictions when a call names them: their changes are told to
+// nobody.
+constexpr char kVersion7[] = R"sql(
+DROP TRIGGER IF EXISTS tell_created ON cases;
+DROP TRIGGER IF EXISTS tell_deleted ON cases;
+DROP TRIGGER IF EXISTS tell_created ON predictions;
+DROP TRIGGER IF EXISTS tell_deleted ON predictions;
+DROP TRIGGER IF EXISTS tell_changed ON shares;
+DROP TRIGGER IF EXISTS tell_changed ON follow_links;
+DROP TRIGGER IF EXISTS tell_changed ON mesh_rights;
+DROP FUNCTION IF EXISTS tissueform_tell_case();
 )sql";
 
 absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transaction) {
@@ -178,6 +179,7 @@ absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transact
     TF_RETURN_IF_ERROR(transaction.Execute(kVersion6));
     TF_RETURN_IF_ERROR(FillIndex(transaction));
   }
+  if (version < 7) TF_RETURN_IF_ERROR(transaction.Execute(kVersion7));
   return transaction.Run("UPDATE tissueform_version SET version = $1", {kPostgresSchemaVersion});
 }
 

@@ -245,11 +245,7 @@ constexpr char kDropIndexColumns[] =
 TEST_F(PostgresStoresTest, RowsFromBeforeThereWereIndexColumnsAreFoundByThem) {
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), 7), IsOk());
   const ShareRow share = {.resource = "projects/project 1", .owner = "planner", .principal = "bob"};
-  std::promise<absl::Status> answered;
-  SqlAccessStore(&stores_->database())
-      .Change({}, {.shares = {share}},
-              [&answered](const absl::Status& status) { answered.set_value(status); });
-  ASSERT_THAT(answered.get_future().get(), IsOk());
+  ASSERT_THAT(SqlAccessStore(&stores_->database()).PutShare(share, /*most=*/1), IsOk());
   stores_.reset();
   RunSql(absl::StrCat(kDropIndexColumns, "UPDATE tissueform_version SET version = 5;"));
   stores_ = OpenTestStores();

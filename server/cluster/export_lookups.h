@@ -22,14 +22,14 @@ namespace tissueform {
 //
 // Thread-safe. Calls block, for kPatience and as long as the read takes. Errors: Unavailable, where
 // it cannot be found out.
-class ReadThroughLoader final {
+class ExportLookups final {
  public:
   static constexpr int kMaxAtOnce = 4;
   static constexpr std::chrono::seconds kRemembered{1};
   static constexpr std::chrono::seconds kPatience{1};  // for one of the places
 
   // ExportQueue::ReadGate.
-  absl::Status ReadForExport(const std::string& id, const std::function<absl::Status()>& read);
+  absl::Status Read(const std::string& id, const std::function<absl::Status()>& read);
 
   // Exports that were looked for.
   int64_t lookups() const;

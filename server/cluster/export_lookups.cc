@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/cluster/read_through_loader.h"
+#include "server/cluster/export_lookups.h"
 
 #include <future>
 #include <utility>
@@ -15,12 +15,12 @@ constexpr size_t kMaxRemembered = 10'000;
 
 }  // namespace
 
-int64_t ReadThroughLoader::lookups() const {
+int64_t ExportLookups::lookups() const {
   MutexLock lock(mutex_);
   return lookups_;
 }
 
-absl::StatusOr<bool> ReadThroughLoader::Begin(const std::string& id) {
+absl::StatusOr<bool> ExportLookups::Begin(const std::string& id) {
   const auto now = std::chrono::steady_clock::now();
   MutexLock lock(mutex_);
   const auto missing = missing_.find(id);
@@ -38,7 +38,7 @@ absl::StatusOr<bool> ReadThroughLoader::Begin(const std::string& id) {
   return true;
 }
 
-absl::Status ReadThroughLoader::ReadForExport(const std::string& id,
+absl::Status ExportLookups::Read(const std::string& id,
                                               const std::function<absl::Status()>& read) {
   TF_ASSIGN_OR_RETURN(const bool begun, Begin(id));
   if (!begun) return absl::OkStatus();
