@@ -96,9 +96,13 @@ absl::Status Access::CheckAsked() {
 
 template <typename Answer>
 absl::StatusOr<Answer> Access::Noting(absl::StatusOr<Answer> answer) {
-  if (absl::IsUnavailable(answer.status())) {
-    MutexLock lock(mutex_);
-    silent_until_ = std::chrono::steady_clock::now() + kNotAskedAgain;
+  const Time now = std::chrono::steady_clock::now();
+  MutexLock lock(mutex_);
+  if (!absl::IsUnavailable(answer.status())) {
+    away_since_.reset();
+  } else {
+    silent_until_ = now + kNotAskedAgain;
+    if (!away_since_.has_value()) away_since_ = now;
   }
   return answer;
 }
@@ -114,8 +118,10 @@ absl::StatusOr<std::optional<SessionGrant>> Access::AskForSession(const Principa
   MutexLock lock(mutex_);
   if (absl::IsUnavailable(grant.status())) {
     const auto known = sessions_.find(key);
-    if (known == sessions_.end() || now - known->second.second > kRememberedWhileAway) return grant;
-    return known->second.first;
+    if (known == sessions_.end()) return grant;
+    const auto& [remembered, at] = known->second;
+    if (at < away_since_.value_or(now) - kRememberedWhenAway) return grant;
+    return remembered;
   }
   TF_RETURN_IF_ERROR(grant.status());
   if (!grant->has_value()) {
@@ -182,8 +188,8 @@ absl::StatusOr<std::optional<Access::Level>> Access::PredictionLevel(const Princ
   if (IsLink(caller)) return Level::kNothing;
   if (grant->owner == caller.name) return Level::kOwner;
   const bool is_exported = IsBridge(caller) && exports_ != nullptr && exports_->IsExported(id);
-  const bool is_shared = grant->role.has_value() ||
-                         (grant->session.has_value() && grant->session->role.has_value());
+  const bool is_shared =
+      grant->role.has_value() || (grant->session.has_value() && grant->session->role.has_value());
   return is_exported || is_shared ? Level::kRead : Level::kNothing;
 }
 

@@ -37,14 +37,14 @@ enum class Permission {
 // name owns is open to those without a name, and to them alone.
 //
 // While a database that servers share does not answer, what was allowed to a principal for a
-// session in the last kRememberedWhileAway stays allowed: this server may still hold the session by
-// a lease, which ends by itself.
+// session in the last kRememberedWhenAway before stays allowed: this server may still hold the
+// session by a lease, which ends by itself.
 //
 // Checks block, those of sessions and links at most 2 s. Errors of all, beside those named:
 // Unavailable (the database does not answer). Thread-safe.
 class Access {
  public:
-  static constexpr std::chrono::seconds kRememberedWhileAway{10};
+  static constexpr std::chrono::seconds kRememberedWhenAway{10};
   // For so long after it has not answered, the database is not asked again for sessions and links.
   static constexpr std::chrono::seconds kNotAskedAgain{1};
   // How long a follow link that was good needs no question: its watchers acknowledge every frame.
@@ -83,8 +83,7 @@ class Access {
   // A mesh is looked at, and sessions are made of it, by who has sent its bytes and who may look at
   // a session or a prediction that holds it; who has sent its bytes owns it. Errors: NotFound,
   // PermissionDenied.
-  absl::Status CheckMeshAccess(const Principal& caller, const std::string& sha256,
-                               Permission need);
+  absl::Status CheckMeshAccess(const Principal& caller, const std::string& sha256, Permission need);
   // At least the meshes that the caller may look at; unset: any.
   absl::StatusOr<std::optional<std::set<std::string>>> MeshesNear(const Principal& caller);
   absl::StatusOr<MeshUse> FindMeshUse(const std::string& sha256) {
@@ -131,8 +130,7 @@ class Access {
   absl::StatusOr<bool> HasGoodLink(const std::string& session);
   absl::StatusOr<Level> LinkLevel(const Principal& link, const std::string& session);
   // Unset: there is no such session.
-  absl::StatusOr<std::optional<Level>> SessionLevel(const Principal& caller,
-                                                    const std::string& id);
+  absl::StatusOr<std::optional<Level>> SessionLevel(const Principal& caller, const std::string& id);
   absl::StatusOr<std::optional<Level>> PredictionLevel(const Principal& caller,
                                                        const std::string& id);
   // Whether a bridge may look at the case for a prediction of somebody who may.
@@ -158,6 +156,7 @@ class Access {
 
   Mutex mutex_;
   Time silent_until_ ABSL_GUARDED_BY(mutex_);
+  std::optional<Time> away_since_ ABSL_GUARDED_BY(mutex_);  // unset: the database has answered last
   // What was answered last, by principal and session, and when.
   std::map<std::pair<std::string, std::string>, std::pair<SessionGrant, Time>> sessions_
       ABSL_GUARDED_BY(mutex_);

@@ -94,8 +94,7 @@ absl::Status AccessChanges::CheckLink(const Principal& caller, const FollowLinkR
 absl::Status AccessChanges::AddLink(const Principal& caller, FollowLinkRow link) {
   TF_RETURN_IF_ERROR(CheckLink(caller, link));
   link.maker = caller.name;
-  const absl::Status kept =
-      store_.PutLink(link, access_.clock_(), options_.max_links_per_session);
+  const absl::Status kept = store_.PutLink(link, access_.clock_(), options_.max_links_per_session);
   if (absl::IsNotFound(kept)) return NoSuchSession(link.session);
   if (HasNoRoom(kept)) {
     return TooMany("follow links", options_.max_links_per_session, "--max-links-per-session");

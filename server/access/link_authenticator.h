@@ -24,8 +24,7 @@ std::string DigestOfLinkToken(absl::string_view token);
 class LinkAuthenticator final : public Authenticator {
  public:
   // Both must outlive it.
-  LinkAuthenticator(Access* access, Authenticator* others)
-      : access_(access), others_(others) {}
+  LinkAuthenticator(Access* access, Authenticator* others) : access_(access), others_(others) {}
 
   absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) override;
   absl::Status IsStillAuthorized(const Authenticated& authenticated) override;

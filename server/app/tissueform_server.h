@@ -131,7 +131,7 @@ class TissueformServer {
   const std::unique_ptr<TokenAuthenticator> tokens_;
   CallQuotas quotas_;
   std::unique_ptr<SqlAccessStore> access_store_;  // its rows are those of the stores
-  std::unique_ptr<ExportStore> export_store_;  // as access_store_
+  std::unique_ptr<ExportStore> export_store_;     // as access_store_
   ExportQueue exports_;
   ExportWatches export_watches_;
   AccessQueries access_queries_;  // of the rows of the stores

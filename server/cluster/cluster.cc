@@ -40,9 +40,7 @@ absl::StatusOr<std::unique_ptr<Cluster>> Cluster::Open(const ClusterOptions& opt
 
 Cluster::Cluster(const ClusterOptions& options, std::string name, PostgresStores* stores,
                  std::unique_ptr<PostgresPool> pool)
-    : pool_(std::move(pool)),
-      stores_(stores),
-      node_(pool_.get(), options, std::move(name)) {}
+    : pool_(std::move(pool)), stores_(stores), node_(pool_.get(), options, std::move(name)) {}
 
 void Cluster::Join(ClusterListeners rooms) {
   rooms.stores = stores_;

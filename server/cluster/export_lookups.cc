@@ -38,8 +38,7 @@ absl::StatusOr<bool> ExportLookups::Begin(const std::string& id) {
   return true;
 }
 
-absl::Status ExportLookups::Read(const std::string& id,
-                                              const std::function<absl::Status()>& read) {
+absl::Status ExportLookups::Read(const std::string& id, const std::function<absl::Status()>& read) {
   TF_ASSIGN_OR_RETURN(const bool begun, Begin(id));
   if (!begun) return absl::OkStatus();
   const absl::Status status = read();

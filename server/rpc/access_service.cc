@@ -141,12 +141,11 @@ grpc::ServerUnaryReactor* AccessService::ListShares(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* AccessService::DeleteShare(grpc::CallbackServerContext* context,
                                                      const v1::DeleteShareRequest* request,
                                                      google::protobuf::Empty* /*response*/) {
-  return HandleStoreCall(context, "AccessService.DeleteShare", gate_, &registry_->pool(),
-                         [=, this](CallScope* scope) {
-                           scope->SetResource(request->resource());
-                           return changes_->Unshare(scope->principal(), request->resource(),
-                                                    request->principal());
-                         });
+  return HandleStoreCall(
+      context, "AccessService.DeleteShare", gate_, &registry_->pool(), [=, this](CallScope* scope) {
+        scope->SetResource(request->resource());
+        return changes_->Unshare(scope->principal(), request->resource(), request->principal());
+      });
 }
 
 grpc::ServerUnaryReactor* AccessService::CreateFollowLink(

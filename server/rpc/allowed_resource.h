@@ -20,8 +20,8 @@ absl::StatusOr<std::string> AllowedSession(Access* access, CallScope* scope,
                                            const std::string& name, Permission need);
 absl::StatusOr<std::string> AllowedPrediction(Access* access, CallScope* scope,
                                               const std::string& name, Permission need);
-absl::StatusOr<std::string> AllowedMesh(Access* access, CallScope* scope,
-                                        const std::string& name, Permission need);
+absl::StatusOr<std::string> AllowedMesh(Access* access, CallScope* scope, const std::string& name,
+                                        Permission need);
 absl::StatusOr<CaseKey> AllowedCase(Access* access, CallScope* scope, const std::string& name,
                                     Permission need);
 

@@ -20,8 +20,8 @@ namespace tissueform {
 // tissueform.v1.CaseService over a store. All pointers must outlive it.
 class CaseService final : public v1::CaseService::CallbackService {
  public:
-  CaseService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
-              CaseStore* store, WorkerPool* pool, DeadlineTimer* timer)
+  CaseService(AdmissionControl* gate, const ServiceLimits& limits, Access* access, CaseStore* store,
+              WorkerPool* pool, DeadlineTimer* timer)
       : gate_(gate), limits_(limits), access_(access), store_(store), pool_(pool), timer_(timer) {}
 
   grpc::ServerReadReactor<v1::UploadCaseRequest>* UploadCase(

@@ -105,7 +105,8 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
       return absl::InvalidArgumentError("set other_prediction or other_model");
     }
     TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request_.other_prediction()));
-    TF_RETURN_IF_ERROR(access_->CheckPredictionAccess(scope().principal(), id, Permission::kRead).status());
+    TF_RETURN_IF_ERROR(
+        access_->CheckPredictionAccess(scope().principal(), id, Permission::kRead).status());
     TF_ASSIGN_OR_RETURN(ReadPrediction other, Read(id, store_));
     if (other.prediction.mesh() != one_.prediction.mesh()) {
       return NotComparable(

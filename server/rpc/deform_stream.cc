@@ -210,20 +210,20 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
   TF_RETURN_IF_ERROR(opening_.TakeRequest(request_.configuration(), limits_));
   flow_.emplace(opening_.request().max_unacked, &streams_->measures());
   flow_->StartPreparation();
-  registry_->pool().Post(Lane::kLeases, [this, caller = scope_.principal(),
-                                         id = opening_.request().session_id] {
-    const absl::StatusOr<Access::Found> found =
-        access_->CheckSessionAccess(caller, id, Permission::kWrite);
-    if (!found.ok()) {
-      TakeSession(found.status());
-      return;
-    }
-    if (*found == Access::Found::kYes) {
-      MutexLock lock(mutex_);
-      scope_.SetResource(SessionName(id));
-    }
-    OpenSession(id);
-  });
+  registry_->pool().Post(Lane::kLeases,
+                         [this, caller = scope_.principal(), id = opening_.request().session_id] {
+                           const absl::StatusOr<Access::Found> found =
+                               access_->CheckSessionAccess(caller, id, Permission::kWrite);
+                           if (!found.ok()) {
+                             TakeSession(found.status());
+                             return;
+                           }
+                           if (*found == Access::Found::kYes) {
+                             MutexLock lock(mutex_);
+                             scope_.SetResource(SessionName(id));
+                           }
+                           OpenSession(id);
+                         });
   return absl::OkStatus();
 }
 

@@ -121,7 +121,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
 
   absl::Status Keep() {
     TF_RETURN_IF_ERROR(access_->CheckStorageQuota(scope_.principal(),
-                                                 static_cast<int64_t>(keep_.positions.size())));
+                                                  static_cast<int64_t>(keep_.positions.size())));
     const absl::Status kept = store_->Create(keep_.record, keep_.positions);
     // The same request twice at once: the other one was first.
     if (absl::IsAlreadyExists(kept) && !key_.fingerprint.empty()) return TakeEarlier();

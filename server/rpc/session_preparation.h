@@ -39,8 +39,8 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   // `tell` (may be empty) and `on_allowed` are not called any more once `done` is. All may take
   // locks of their own, under which nobody calls this object. The pointers must outlive it.
   SessionPreparation(const ServiceLimits& limits, Access* access, MeshCatalog* catalog,
-                     SessionRegistry* registry, v1::PrepareSessionRequest request,
-                     TellSession tell, OnAllowed on_allowed, Done done);
+                     SessionRegistry* registry, v1::PrepareSessionRequest request, TellSession tell,
+                     OnAllowed on_allowed, Done done);
 
   // Once. `admission` is why the call is not served, or OK; `caller` whose session it will be.
   //

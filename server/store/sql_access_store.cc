@@ -92,7 +92,8 @@ absl::StatusOr<std::vector<ShareRow>> SqlAccessStore::SharesOf(const std::string
   for (size_t row = 0; row < rows.size(); ++row) {
     ShareRow share;
     const absl::StatusOr<absl::string_view> bytes = Unseal(rows.Text(row, 1));
-    if (!bytes.ok() || !ParseRow(*bytes, &share).ok() || KeyOf(share) != rows.Text(row, 0)) continue;
+    if (!bytes.ok() || !ParseRow(*bytes, &share).ok() || KeyOf(share) != rows.Text(row, 0))
+      continue;
     shares.push_back(std::move(share));
   }
   return shares;

@@ -16,7 +16,7 @@ struct StoreChange {
     kSessionChanged,  // its record, not its poses
     kMeshDeleted,
     kExportsChanged,  // no name
-    kMissed,  // the connection was lost: anything may have changed
+    kMissed,          // the connection was lost: anything may have changed
   };
 
   Kind kind = Kind::kMissed;

@@ -3,8 +3,11 @@
 
 #include "server/access/access.h"
 
+#include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -29,6 +32,33 @@ using Code = absl::StatusCode;
 const std::string kMesh(64, 'e');
 const std::string kCaseBytes = "the bytes of a case";
 const std::string kCase = CaseRecordOf(kCaseBytes).sha256;
+
+// A database that can be away.
+class AwayDatabase final : public SqlDatabase {
+ public:
+  explicit AwayDatabase(SqlDatabase* database) : database_(*database) {}
+
+  void set_away(bool away) { away_ = away; }
+  int asked() const { return asked_; }
+
+  absl::Status Run(const SqlJob& job) override {
+    ++asked_;
+    return away_ ? absl::UnavailableError("away") : database_.Run(job);
+  }
+  void Submit(const std::string& key, SqlJob job, StatusCallback done) override {
+    database_.Submit(key, std::move(job), std::move(done));
+  }
+  void Peek(const std::string& key, SqlJob job, StatusCallback done) override {
+    database_.Peek(key, std::move(job), std::move(done));
+  }
+  bool shared() const override { return true; }
+  const DurationHistogram* latency() const override { return nullptr; }
+
+ private:
+  SqlDatabase& database_;
+  bool away_ = false;
+  int asked_ = 0;
+};
 
 // Ann has a session, a prediction of it and a case, all in one project but the prediction; nobody
 // else has anything.
@@ -256,7 +286,10 @@ TEST_F(AccessTest, ALinkFollowsItsSessionReadsItsCaseAndNothingElse) {
   EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kRead),
               StatusIs(Code::kUnauthenticated))
       << "nobody has made one";
-  ASSERT_THAT(changes_.AddLink(ann_, {.digest = "d", .session = "s", .case_sha256 = kCase, .expires_s = now_s_ + 1}), IsOk());
+  ASSERT_THAT(
+      changes_.AddLink(
+          ann_, {.digest = "d", .session = "s", .case_sha256 = kCase, .expires_s = now_s_ + 1}),
+      IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kRead), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kWrite),
               StatusIs(Code::kPermissionDenied));
@@ -274,7 +307,8 @@ TEST_F(AccessTest, ALinkFollowsItsSessionReadsItsCaseAndNothingElse) {
 
 TEST_F(AccessTest, ALinkEndsWhenItsMakerMayDragNoMore) {
   ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kPlanner), IsOk());
-  ASSERT_THAT(changes_.AddLink(bob_, {.digest = "d", .session = "s", .expires_s = now_s_ + 100}), IsOk());
+  ASSERT_THAT(changes_.AddLink(bob_, {.digest = "d", .session = "s", .expires_s = now_s_ + 100}),
+              IsOk());
   EXPECT_THAT(access_.FindLink("d"), IsOk());
   ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kViewer), IsOk());
   EXPECT_THAT(access_.FindLink("d").status(), StatusIs(Code::kUnauthenticated));
@@ -316,6 +350,47 @@ TEST_F(AccessTest, OnlyAProjectOfTheTokenTakesNewResources) {
   EXPECT_THAT(Access::CheckProjectAccess(nobody_, "p\n"), StatusIs(Code::kInvalidArgument));
   EXPECT_THAT(Access::CheckProjectAccess(nobody_, std::string(129, 'p')),
               StatusIs(Code::kInvalidArgument));
+}
+
+TEST_F(AccessTest, WhileTheDatabaseIsAwayWhoWasThereGoesOnAndNobodyElse) {
+  AwayDatabase database(&stores_->database());
+  AccessQueries queries(&database);
+  Access access(&queries);
+  ASSERT_THAT(Share("sessions/s", "bob"), IsOk());
+  ASSERT_THAT(access.CheckSessionAccess(bob_, "s", Permission::kRead), IsOk());
+  ASSERT_THAT(access.CheckSessionAccess(Principal{.name = "cid"}, "s", Permission::kRead),
+              StatusIs(Code::kNotFound));
+  database.set_away(true);
+  EXPECT_THAT(access.CheckSessionAccess(bob_, "s", Permission::kRead), IsOk());
+  EXPECT_THAT(access.CheckSessionAccess(bob_, "s", Permission::kWrite),
+              StatusIs(Code::kPermissionDenied));
+  EXPECT_THAT(access.CheckSessionAccess(Principal{.name = "cid"}, "s", Permission::kRead),
+              StatusIs(Code::kNotFound));
+  EXPECT_THAT(access.CheckSessionAccess(ann_, "s", Permission::kRead), StatusIs(Code::kUnavailable))
+      << "she was not there";
+  EXPECT_THAT(access.RecheckSessionAccess(ann_, "s", Permission::kRead), IsOk())
+      << "what uses the session ends with the reason";
+  EXPECT_THAT(access.CheckPredictionAccess(ann_, "q", Permission::kRead),
+              StatusIs(Code::kUnavailable));
+}
+
+TEST_F(AccessTest, ADatabaseThatIsAwayIsAskedForSessionsOnceASecond) {
+  AwayDatabase database(&stores_->database());
+  AccessQueries queries(&database);
+  Access access(&queries);
+  database.set_away(true);
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_THAT(access.CheckSessionAccess(ann_, "s", Permission::kRead),
+                StatusIs(Code::kUnavailable));
+  }
+  EXPECT_LT(database.asked(), 100);
+  database.set_away(false);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!access.CheckSessionAccess(ann_, "s", Permission::kOwner).ok() &&
+         std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  EXPECT_THAT(access.CheckSessionAccess(ann_, "s", Permission::kOwner), IsOk());
 }
 
 }  // namespace

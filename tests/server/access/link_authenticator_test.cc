@@ -40,10 +40,10 @@ class LinkAuthenticatorTest : public ::testing::Test {
     session.id = "s";
     session.owner = "ann";
     ASSERT_THAT(CreateSession(store_.stores->sessions(), session), IsOk());
-    ASSERT_THAT(changes_.AddLink({.name = "ann"}, {.digest = DigestOfLinkToken(token_),
-                                                   .session = "s",
-                                                   .expires_s = 1010}),
-                IsOk());
+    ASSERT_THAT(
+        changes_.AddLink({.name = "ann"},
+                         {.digest = DigestOfLinkToken(token_), .session = "s", .expires_s = 1010}),
+        IsOk());
   }
 
   absl::StatusOr<Authenticated> Come(const std::string& header) {

@@ -274,9 +274,8 @@ TEST_P(AccessQueriesTest, ALinkComesWithWhatItsMakerHas) {
   EXPECT_EQ(found->maker->owner, "ann");
   EXPECT_EQ(found->maker->role, ShareRole::kPlanner);
   EXPECT_THAT(*queries_.LinksOf("s"), SizeIs(1));
-  ASSERT_THAT(
-      access_.EraseShare({.resource = "projects/p", .owner = "ann", .principal = "bob"}),
-      IsOk());
+  ASSERT_THAT(access_.EraseShare({.resource = "projects/p", .owner = "ann", .principal = "bob"}),
+              IsOk());
   EXPECT_EQ((*queries_.FindLink("d"))->maker->role, std::nullopt);
 }
 

@@ -42,7 +42,10 @@ FollowLinkRow LinkOf(const std::string& digest, int64_t expires_s = 4711) {
 // What SqlAccessStore does with every driver.
 class AccessStoreContractTest : public ::testing::TestWithParam<StoresCase> {
  protected:
+  // Of a mesh that is stored, as a database wants it.
   void MakeSession(const std::string& id) {
+    const MeshPayload mesh = SamplePayload(1);
+    ASSERT_THAT(stores_->meshes().Put(RecordOf(mesh), mesh.View()), IsOk());
     SessionRecord record = SampleSession(id, 1);
     record.owner = "ann";
     ASSERT_THAT(CreateSession(stores_->sessions(), record), IsOk());

@@ -83,12 +83,11 @@ TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndNothingElse) {
   ASSERT_THAT(DeleteSession(stores_->sessions(), "s"), IsOk());
   ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
   const StoreChange last = {.kind = Kind::kMeshDeleted, .name = mesh};
-  const std::vector<StoreChange> expected = {
-      {.kind = Kind::kSessionCreated, .name = "s"},
-      {.kind = Kind::kSessionChanged, .name = "s"},
-      {.kind = Kind::kExportsChanged},
-      {.kind = Kind::kSessionDeleted, .name = "s"},
-      last};
+  const std::vector<StoreChange> expected = {{.kind = Kind::kSessionCreated, .name = "s"},
+                                             {.kind = Kind::kSessionChanged, .name = "s"},
+                                             {.kind = Kind::kExportsChanged},
+                                             {.kind = Kind::kSessionDeleted, .name = "s"},
+                                             last};
   EXPECT_EQ(SeenUntil(last), expected);
 }
 

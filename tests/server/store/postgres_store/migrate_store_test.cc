@@ -13,9 +13,9 @@
 
 #include "server/exports/export_store.h"
 #include "server/platform/storage/data_folder.h"
+#include "server/store/access_queries.h"
 #include "server/store/durable_store.h"
 #include "server/store/postgres_store/postgres_session_leases.h"
-#include "server/store/access_queries.h"
 #include "server/store/sql_access_store.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
