@@ -29,8 +29,8 @@
 //
 //   tissueform-store-benchmark FOLDER [COMMITS [URL]]
 //
-// in a new folder below FOLDER, on the disk to ask. URL: also asks an empty PostgreSQL database; its
-// password is in the environment variable TISSUEFORM_STORE_PASSWORD.
+// in a new folder below FOLDER, on the disk to ask. URL: also asks an empty PostgreSQL database;
+// its password is in the environment variable TISSUEFORM_STORE_PASSWORD.
 namespace tissueform {
 namespace {
 
