@@ -73,7 +73,8 @@ absl::Status Mark(const std::vector<int32_t>& vertices, int region,
 
 absl::StatusOr<ConstraintSet> ConstraintSet::Create(Eigen::Index num_vertices,
                                                     std::vector<int32_t> fixed,
-                                                    std::vector<HandleRegion> handles) {
+                                                    std::vector<HandleRegion> handles,
+                                                    std::vector<ContactRow> contact) {
   TF_RETURN_IF_ERROR(CheckNames(handles));
   SortUnique(&fixed);
   std::vector<int> region_of_vertex(num_vertices, kFree);
@@ -83,12 +84,17 @@ absl::StatusOr<ConstraintSet> ConstraintSet::Create(Eigen::Index num_vertices,
     TF_RETURN_IF_ERROR(Mark(handles[h].vertices, static_cast<int>(h), handles, &region_of_vertex));
   }
   ConstraintSet set;
+  std::vector<bool> is_constrained(static_cast<size_t>(num_vertices), false);
   for (int32_t v = 0; v < num_vertices; ++v) {
     if (region_of_vertex[v] != kFree) {
+      is_constrained[static_cast<size_t>(v)] = true;
       set.constrained_.push_back(v);
       set.region_of_constrained_.push_back(region_of_vertex[v]);
     }
   }
+  TF_RETURN_IF_ERROR(CheckContactRows(contact, is_constrained, static_cast<int>(handles.size())));
+  for (ContactRow& row : contact) row.normal.normalize();
+  set.contact_ = std::move(contact);
   set.fixed_ = std::move(fixed);
   set.handles_ = std::move(handles);
   return set;

@@ -4,6 +4,7 @@
 #include "core/mechanics/deformation/create_deformer.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/linear_elastic_deformer.h"
 
 namespace tissueform {
@@ -39,6 +40,10 @@ bool HasPreparedAnswers(const DeformerOptions& options) {
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
     const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options,
     const Cancellation& cancellation) {
+  const ModelTraits& model = TraitsOf(options.model);
+  if (!model.has_contact) {
+    TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), model.name));
+  }
   switch (options.model) {
     case DeformationModel::kGradientField:
       break;

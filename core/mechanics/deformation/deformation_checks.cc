@@ -41,6 +41,13 @@ absl::Status CheckStiffness(Eigen::Index num_cells, const Eigen::VectorXd& stiff
   return absl::OkStatus();
 }
 
+absl::Status CheckWithoutContact(const ConstraintSet& constraints, absl::string_view who) {
+  if (constraints.contact().empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(who, " does not compute contact; leave out the contact rows, or use the model ",
+                   "linear_elastic"));
+}
+
 absl::Status CheckTolerance(double tolerance_mm) {
   if (!std::isfinite(tolerance_mm) || tolerance_mm <= 0) {
     return absl::InvalidArgumentError(

@@ -24,6 +24,9 @@ absl::Status CheckPoses(const ConstraintSet& constraints, absl::Span<const Handl
 absl::Status CheckStiffness(Eigen::Index num_cells, const Eigen::VectorXd& stiffness,
                             absl::string_view cell_name);
 
+// InvalidArgument where tissue slides or lifts off, for `who` ("arap"), who cannot compute that.
+absl::Status CheckWithoutContact(const ConstraintSet& constraints, absl::string_view who);
+
 // InvalidArgument unless it is a positive number.
 absl::Status CheckTolerance(double tolerance_mm);
 

@@ -57,9 +57,18 @@ struct SolveSummary {
   double error_estimate_mm = 0;
 };
 
+// Of the unilateral contact rows, in the order of the constraint set; empty without any.
+struct ContactAnswer {
+  std::vector<double> forces;   // Pa mm^2, at least 0
+  std::vector<double> gaps_mm;  // at least 0 within the residual
+  // How far the answer misses the conditions of contact at most (LcpSolution::kkt_residual_mm).
+  double residual_mm = 0;
+};
+
 struct Deformation {
   Positions positions;  // #V by 3, mm
   SolveSummary summary;
+  ContactAnswer contact;
 };
 
 // How an answer is sought, for models that iterate.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "absl/memory/memory.h"
 #include "absl/strings/str_cat.h"
@@ -79,13 +80,40 @@ Eigen::MatrixXd AffineMotions(const TetMesh& mesh, const ConstraintSet& constrai
   return values;
 }
 
+// The displacements along the normals of the held unknowns (#held by 12) in the same motions.
+Eigen::MatrixXd SlidingMotions(const TetMesh& mesh, const ConstraintSet& constraints,
+                               const SlidingBasis& sliding, int handle,
+                               const Eigen::Vector3d& origin) {
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sliding.held().size()),
+                                                 ElasticSystem::kColumnsPerHandle);
+  for (Eigen::Index held = 0; held < values.rows(); ++held) {
+    const int32_t number = sliding.held()[static_cast<size_t>(held)].row;
+    const ContactRow& row = constraints.contact()[static_cast<size_t>(number)];
+    if (row.handle == handle) {
+      values.row(held) =
+          ElasticSystem::AffineMotionAlong(row.normal, mesh.positions().row(row.vertex), origin);
+    }
+  }
+  return values;
+}
+
 }  // namespace
+
+Eigen::Matrix<double, 1, ElasticSystem::kColumnsPerHandle> ElasticSystem::AffineMotionAlong(
+    const Eigen::Vector3d& normal, const Eigen::RowVector3d& place, const Eigen::Vector3d& origin) {
+  Eigen::RowVector4d x;
+  x << place - origin.transpose(), 1.0;
+  Eigen::Matrix<double, 1, kColumnsPerHandle> motion;
+  for (int axis = 0; axis < 3; ++axis) motion.segment<4>(4 * axis) = normal[axis] * x;
+  return motion;
+}
 
 absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
     const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
     const ElasticSystemOptions& options, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(CheckPoissonRatio(options.poisson_ratio));
-  auto elastic = absl::WrapUnique(new ElasticSystem());
+  auto elastic =
+      absl::WrapUnique(new ElasticSystem(SlidingBasis(constraints, mesh.num_vertices())));
   // Affine motions are taken about the middle of the mesh. About zero, which may lie far outside it
   // in a scanner's coordinates, a small turn would be the difference of two large columns.
   elastic->origin_ =
@@ -95,17 +123,10 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
   {
     const PiecewiseLinearElements elements = ElementsOf(mesh);
     const VertexCells vertex_cells(elements.cells, elements.num_vertices());
-    const SparseMatrix K =
+    SparseMatrix K =
         ElasticStiffness(elements, vertex_cells, stiffness, options.poisson_ratio, options.threads);
     elastic->assemble_seconds_ = stopwatch.Seconds();
-    TF_ASSIGN_OR_RETURN(elastic->system_,
-                        DirichletSystem::Create(K, ConstrainedUnknowns(constraints),
-                                                {.backend = options.backend,
-                                                 .admission = options.admission,
-                                                 .unknowns_per_node = 3,
-                                                 .node_order = options.node_order,
-                                                 .observer = options.observer},
-                                                cancellation));
+    TF_RETURN_IF_ERROR(elastic->Factorize(std::move(K), constraints, options, cancellation));
   }
   TF_ASSIGN_OR_RETURN(const double of_system,
                       elastic->system_->EstimateCondition(kConditionIterations));
@@ -115,6 +136,41 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
   TF_RETURN_IF_ERROR(elastic->PrepareResponses(mesh, constraints, options, cancellation));
   elastic->response_seconds_ = stopwatch.Seconds();
   return elastic;
+}
+
+absl::Status ElasticSystem::Factorize(SparseMatrix K, const ConstraintSet& constraints,
+                                      const ElasticSystemOptions& options,
+                                      const Cancellation& cancellation) {
+  if (!sliding_.empty()) {
+    // Turned vertices stay whole nodes of the factor: their held unknowns are left in it, alone.
+    held_ = HoldUnknowns(sliding_.Turn(K), sliding_.held());
+    K = std::move(held_.matrix);
+  }
+  TF_ASSIGN_OR_RETURN(system_, DirichletSystem::Create(K, ConstrainedUnknowns(constraints),
+                                                       {.backend = options.backend,
+                                                        .admission = options.admission,
+                                                        .unknowns_per_node = 3,
+                                                        .node_order = options.node_order,
+                                                        .observer = options.observer},
+                                                       cancellation));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Eigen::MatrixXd> ElasticSystem::Solve(const Eigen::MatrixXd& forces,
+                                                     const Eigen::MatrixXd& values,
+                                                     const Eigen::MatrixXd& sliding) const {
+  if (sliding_.empty()) return system_->Solve(forces, values);
+  Eigen::MatrixXd rhs = forces;
+  if (rhs.rows() == 0) rhs = Eigen::MatrixXd::Zero(response_columns_.rows(), values.cols());
+  sliding_.ToTurned(&rhs);
+  Eigen::MatrixXd along_normals = sliding;
+  if (sliding.rows() == 0)
+    along_normals =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sliding_.held().size()), values.cols());
+  PrescribeHeld(held_, sliding_.held(), along_normals, &rhs);
+  TF_ASSIGN_OR_RETURN(Eigen::MatrixXd displacements, system_->Solve(rhs, values));
+  sliding_.FromTurned(&displacements);
+  return displacements;
 }
 
 absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
@@ -135,7 +191,8 @@ absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const Constrai
                  columns);
     TF_ASSIGN_OR_RETURN(
         response_columns_.middleCols(Eigen::Index{kColumnsPerHandle} * h, kColumnsPerHandle),
-        system_->Solve({}, AffineMotions(mesh, constraints, h, origin_)));
+        Solve({}, AffineMotions(mesh, constraints, h, origin_),
+              SlidingMotions(mesh, constraints, sliding_, h, origin_)));
   }
   TellProgress(options.observer, PreparationStage::kResponses, columns, columns);
   return absl::OkStatus();
@@ -169,7 +226,8 @@ absl::StatusOr<const SinglePrecisionSolver*> ElasticSystem::Rounded(
 }
 
 int64_t ElasticSystem::bytes_held() const {
-  return system_->bytes_held() + (rounded_ != nullptr ? system_->single_precision_bytes() : 0) +
+  return system_->bytes_held() + held_.columns.nonZeros() * static_cast<int64_t>(16) +
+         (rounded_ != nullptr ? system_->single_precision_bytes() : 0) +
          response_columns_.size() * static_cast<int64_t>(sizeof(double));
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/mechanics/contact/lcp_solver.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/handle_targets.h"
 
@@ -28,19 +29,25 @@ Positions Targets(const MeshPreparation& preparation, absl::Span<const HandlePos
   return ConstrainedPositions(preparation.mesh().positions(), preparation.constraints(), poses);
 }
 
+PreparationSummary SummaryOf(const MeshPreparation& preparation, const ElasticSystem& elastic) {
+  const FactorizationSummary& factorization = elastic.system().factorization();
+  return {.assemble_seconds = elastic.assemble_seconds(),
+          .analyse_seconds = factorization.analyse_seconds,
+          .factorise_seconds = factorization.factorise_seconds,
+          .prepare_seconds = elastic.response_seconds(),
+          .factor_bytes = factorization.factor_bytes,
+          .bytes_held = preparation.bytes_held()};
+}
+
 class LinearElasticDeformer : public Deformer {
  public:
   LinearElasticDeformer(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic)
-      : preparation_(std::move(preparation)), elastic_(elastic) {
-    const FactorizationSummary& factorization = elastic_.system().factorization();
-    summary_.assemble_seconds = elastic_.assemble_seconds();
-    summary_.analyse_seconds = factorization.analyse_seconds;
-    summary_.factorise_seconds = factorization.factorise_seconds;
-    summary_.prepare_seconds = elastic_.response_seconds();
-    summary_.factor_bytes = factorization.factor_bytes;
+      : preparation_(std::move(preparation)),
+        elastic_(elastic),
+        summary_(SummaryOf(*preparation_, elastic)) {
     displacements_.resize(elastic_.response_columns().rows());
     summary_.own_bytes = displacements_.size() * static_cast<int64_t>(sizeof(double));
-    summary_.bytes_held = preparation_->bytes_held() + summary_.own_bytes;
+    summary_.bytes_held += summary_.own_bytes;
   }
 
   absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
@@ -65,16 +72,63 @@ class LinearElasticDeformer : public Deformer {
   Eigen::VectorXd displacements_;  // workspace
 };
 
+// With unilateral contact rows.
+class LinearContactDeformer : public Deformer {
+ public:
+  LinearContactDeformer(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
+                        const ElasticContact& contact)
+      : preparation_(std::move(preparation)),
+        elastic_(elastic),
+        contact_(contact),
+        solver_({contact.compliance().data(), static_cast<size_t>(contact.compliance().size())},
+                contact.rows().size()),
+        summary_(SummaryOf(*preparation_, elastic)) {}
+
+  absl::StatusOr<Deformation> Deform(absl::Span<const HandlePose> poses,
+                                     const DeformControl& /*control*/) override {
+    TF_RETURN_IF_ERROR(CheckPoses(preparation_->constraints(), poses));
+    const Stopwatch stopwatch;
+    const Eigen::VectorXd coefficients = elastic_.Coefficients(poses);
+    const Eigen::VectorXd gaps = contact_.Gaps(coefficients);
+    const LcpSolution& solution = solver_.Solve({gaps.data(), static_cast<size_t>(gaps.size())});
+    TF_ASSIGN_OR_RETURN(const Eigen::VectorXd pushed, contact_.Displacements(solution.multipliers));
+    Deformation deformation;
+    deformation.positions =
+        ToPositions(*preparation_, elastic_.response_columns() * coefficients + pushed,
+                    Targets(*preparation_, poses));
+    deformation.contact = {.forces = solution.multipliers,
+                           .gaps_mm = solution.gaps_mm,
+                           .residual_mm = solution.kkt_residual_mm};
+    deformation.summary.converged = solution.converged;
+    deformation.summary.solve_seconds = stopwatch.Seconds();
+    return deformation;
+  }
+
+  const PreparationSummary& preparation() const override { return summary_; }
+
+ private:
+  const std::shared_ptr<MeshPreparation> preparation_;  // owns the next two
+  const ElasticSystem& elastic_;
+  const ElasticContact& contact_;
+  LcpSolver solver_;
+  const PreparationSummary summary_;
+};
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateLinearElasticDeformer(
     std::shared_ptr<MeshPreparation> preparation, const Cancellation& cancellation) {
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
+  TF_ASSIGN_OR_RETURN(const ElasticContact* contact, preparation->Contact(cancellation));
+  if (!contact->rows().empty()) {
+    return std::make_unique<LinearContactDeformer>(std::move(preparation), *elastic, *contact);
+  }
   return std::make_unique<LinearElasticDeformer>(std::move(preparation), *elastic);
 }
 
 absl::StatusOr<Deformation> SolveLinearElasticDirectly(MeshPreparation* preparation,
                                                        absl::Span<const HandlePose> poses) {
+  TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), "the direct solve"));
   TF_RETURN_IF_ERROR(CheckPoses(preparation->constraints(), poses));
   TF_ASSIGN_OR_RETURN(ElasticSystem * elastic, preparation->Elastic());
   const Stopwatch stopwatch;

@@ -42,6 +42,25 @@ absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
 
 int64_t PreparedLaplacian::bytes_held() const { return system->bytes_held() + BytesOf(harmonic); }
 
+namespace {
+
+absl::Status CheckContactIsOfTets(const TetMesh& mesh, const ConstraintSet& constraints) {
+  if (constraints.contact().empty()) return absl::OkStatus();
+  std::vector<bool> in_tet(static_cast<size_t>(mesh.num_vertices()), false);
+  for (const int32_t vertex : mesh.tets().reshaped()) in_tet[static_cast<size_t>(vertex)] = true;
+  for (size_t row = 0; row < constraints.contact().size(); ++row) {
+    const ContactRow& of_row = constraints.contact()[row];
+    for (const int32_t vertex : {of_row.vertex, of_row.other}) {
+      if (vertex == ContactRow::kBone || in_tet[static_cast<size_t>(vertex)]) continue;
+      return absl::InvalidArgumentError(absl::StrCat("contact row ", row, " names vertex ", vertex,
+                                                     ", which no tet holds; remove the row"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
 absl::StatusOr<std::shared_ptr<MeshPreparation>> MeshPreparation::Create(
     const TetMesh& mesh, const Eigen::VectorXd& stiffness, const ConstraintSet& constraints,
     PreparationOptions options) {
@@ -51,6 +70,7 @@ absl::StatusOr<std::shared_ptr<MeshPreparation>> MeshPreparation::Create(
   }
   TF_RETURN_IF_ERROR(CheckStiffness(mesh.num_tets(), stiffness, "tet"));
   TF_RETURN_IF_ERROR(CheckEveryComponentConstrained(mesh.tets(), mesh.num_vertices(), constraints));
+  TF_RETURN_IF_ERROR(CheckContactIsOfTets(mesh, constraints));
   return absl::WrapUnique(new MeshPreparation(mesh, stiffness, constraints, std::move(options)));
 }
 
@@ -97,8 +117,18 @@ absl::StatusOr<ElasticSystem*> MeshPreparation::Elastic(const Cancellation& canc
   return elastic_.get();
 }
 
+absl::StatusOr<const ElasticContact*> MeshPreparation::Contact(const Cancellation& cancellation) {
+  if (contact_ == nullptr) {
+    TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, Elastic(cancellation));
+    TF_ASSIGN_OR_RETURN(contact_, ElasticContact::Create(mesh_, constraints_, *elastic,
+                                                         options_.admission, cancellation));
+  }
+  return contact_.get();
+}
+
 int64_t MeshPreparation::bytes_held() const {
-  return laplacian_bytes() + (elastic_ != nullptr ? elastic_->bytes_held() : 0);
+  return laplacian_bytes() + (elastic_ != nullptr ? elastic_->bytes_held() : 0) +
+         (contact_ != nullptr ? contact_->bytes_held() : 0);
 }
 
 int64_t MeshPreparation::laplacian_bytes() const {

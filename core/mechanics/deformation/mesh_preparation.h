@@ -12,6 +12,7 @@
 #include "core/base/cancellation.h"
 #include "core/base/preparation_progress.h"
 #include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/deformation/elastic_contact.h"
 #include "core/mechanics/deformation/elastic_system.h"
 #include "core/mechanics/linear_solvers/dirichlet_system.h"
 #include "core/mesh/operators/piecewise_linear_elements.h"
@@ -64,7 +65,8 @@ class MeshPreparation {
   // Checks, and factorises nothing yet. `stiffness` is Young's modulus per tet in Pa, #T.
   //
   // Errors: InvalidArgument (a mesh that is not usable, stiffness not positive or of the wrong
-  // length, a connected component without constraint, a Poisson's ratio outside [0, 0.5)).
+  // length, a connected component without constraint, a contact row at a vertex that no tet holds,
+  // a Poisson's ratio outside [0, 0.5)).
   static absl::StatusOr<std::shared_ptr<MeshPreparation>> Create(const TetMesh& mesh,
                                                                  const Eigen::VectorXd& stiffness,
                                                                  const ConstraintSet& constraints,
@@ -82,6 +84,8 @@ class MeshPreparation {
   // preparation.
   absl::StatusOr<PreparedLaplacian*> Laplacian(const Cancellation& cancellation = {});
   absl::StatusOr<ElasticSystem*> Elastic(const Cancellation& cancellation = {});
+  // Errors: those of Elastic and ElasticContact::Create.
+  absl::StatusOr<const ElasticContact*> Contact(const Cancellation& cancellation = {});
 
   bool has_laplacian() const { return laplacian_ != nullptr; }
   bool has_elastic() const { return elastic_ != nullptr; }
@@ -111,6 +115,7 @@ class MeshPreparation {
   // Null until asked for.
   std::unique_ptr<PreparedLaplacian> laplacian_;
   std::unique_ptr<ElasticSystem> elastic_;
+  std::unique_ptr<ElasticContact> contact_;  // uses elastic_
 
   std::vector<int32_t> node_order_;
 };

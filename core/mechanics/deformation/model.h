@@ -23,6 +23,8 @@ struct ModelTraits {
   bool is_elastic;
   // gradient_field: with propagated rotations and cotangent guidance only (HasPreparedAnswers).
   bool has_prepared_answers;
+  // Tissue that touches bone or other tissue (ConstraintSet::contact) slides and lifts off.
+  bool has_contact;
 };
 
 // One row for each model, in the order in which users see them.

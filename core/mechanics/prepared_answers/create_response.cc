@@ -3,6 +3,8 @@
 
 #include "core/mechanics/prepared_answers/create_response.h"
 
+#include "core/base/status_macros.h"
+#include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/prepared_answers/linear_elastic_response.h"
 #include "core/mechanics/prepared_answers/neo_hookean_response.h"
 #include "core/mechanics/prepared_answers/response_basis.h"
@@ -12,6 +14,7 @@ namespace tissueform {
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const ResponseOptions& options, const Cancellation& cancellation) {
+  TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), "a prepared answer"));
   if (options.model == DeformationModel::kLinearElastic) {
     return CreateLinearElasticResponse(preparation, vertices,
                                        {.tolerance_mm = options.tolerance_mm,

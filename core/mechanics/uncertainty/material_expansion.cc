@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/elasticity/elastic_stiffness.h"
 #include "core/mechanics/elasticity/neo_hookean_energy.h"
 #include "core/mechanics/elasticity/neo_hookean_tangent.h"
@@ -163,6 +164,7 @@ absl::StatusOr<MaterialExpansion> ExpandLinearElastic(MeshPreparation* preparati
                                                       const Eigen::MatrixXd& displacements,
                                                       ExpansionOrder order,
                                                       const Cancellation& cancellation) {
+  TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), "the band of uncertainty"));
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
   LawAtState law;
   law.tangent = [preparation](const Eigen::VectorXd& stiffness, double poisson_ratio) {

@@ -1,0 +1,118 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/mechanics/deformation/elastic_contact.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "absl/memory/memory.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+// Right-hand sides of one pass over the factor.
+constexpr Eigen::Index kRowsPerPass = 32;
+// A row is one that cannot move if its compliance is below this share of the largest.
+constexpr double kNoCompliance = 1e-10;
+
+void AddDirection(int32_t vertex, const Eigen::Vector3d& normal, Eigen::Index row,
+                  std::vector<Eigen::Triplet<double, int32_t>>* entries) {
+  for (int axis = 0; axis < 3; ++axis) {
+    entries->emplace_back(3 * vertex + axis, static_cast<int32_t>(row), normal[axis]);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<ElasticContact>> ElasticContact::Create(
+    const TetMesh& mesh, const ConstraintSet& constraints, const ElasticSystem& elastic,
+    const FactorAdmission& admission, const Cancellation& cancellation) {
+  auto contact = absl::WrapUnique(new ElasticContact(elastic));
+  contact->num_constrained_ = static_cast<Eigen::Index>(constraints.constrained().size());
+  for (size_t row = 0; row < constraints.contact().size(); ++row) {
+    if (!constraints.contact()[row].bilateral) contact->rows_.push_back(static_cast<int32_t>(row));
+  }
+  const auto num_rows = static_cast<int64_t>(contact->rows_.size());
+  if (admission) {
+    TF_RETURN_IF_ERROR(admission(num_rows * (num_rows + elastic.response_columns().cols()) *
+                                 static_cast<int64_t>(sizeof(double))));
+  }
+  contact->TakeRows(mesh, constraints);
+  TF_RETURN_IF_ERROR(contact->MakeCompliance(cancellation));
+  TF_RETURN_IF_ERROR(contact->CheckCompliance());
+  return contact;
+}
+
+void ElasticContact::TakeRows(const TetMesh& mesh, const ConstraintSet& constraints) {
+  const auto num_rows = static_cast<Eigen::Index>(rows_.size());
+  const Eigen::MatrixXd& responses = elastic_.response_columns();
+  std::vector<Eigen::Triplet<double, int32_t>> entries;
+  Eigen::MatrixXd bone_motions = Eigen::MatrixXd::Zero(num_rows, responses.cols());
+  gaps_at_rest_.resize(num_rows);
+  for (Eigen::Index r = 0; r < num_rows; ++r) {
+    const ContactRow& row = constraints.contact()[static_cast<size_t>(rows_[static_cast<size_t>(r)])];
+    gaps_at_rest_[r] = row.gap_mm;
+    AddDirection(row.vertex, row.normal, r, &entries);
+    if (row.other != ContactRow::kBone) {
+      AddDirection(row.other, -row.normal, r, &entries);
+    } else if (row.handle != ContactRow::kFixedBone) {
+      bone_motions.block<1, ElasticSystem::kColumnsPerHandle>(
+          r, Eigen::Index{ElasticSystem::kColumnsPerHandle} * row.handle) =
+          ElasticSystem::AffineMotionAlong(row.normal, mesh.positions().row(row.vertex),
+                                           elastic_.origin());
+    }
+  }
+  directions_.resize(responses.rows(), num_rows);
+  directions_.setFromTriplets(entries.begin(), entries.end());
+  gap_columns_ = directions_.transpose() * responses - bone_motions;
+}
+
+absl::Status ElasticContact::MakeCompliance(const Cancellation& cancellation) {
+  const Eigen::Index num_rows = directions_.cols();
+  compliance_.resize(num_rows, num_rows);
+  for (Eigen::Index first = 0; first < num_rows; first += kRowsPerPass) {
+    TF_RETURN_IF_ERROR(cancellation.Check());
+    const Eigen::Index count = std::min(kRowsPerPass, num_rows - first);
+    TF_ASSIGN_OR_RETURN(
+        const Eigen::MatrixXd responses,
+        elastic_.Solve(directions_.middleCols(first, count),
+                       Eigen::MatrixXd::Zero(3 * num_constrained_, count)));
+    compliance_.middleCols(first, count).noalias() = directions_.transpose() * responses;
+  }
+  // Two solves differ in their last digits.
+  compliance_ = (0.5 * (compliance_ + compliance_.transpose())).eval();
+  return absl::OkStatus();
+}
+
+absl::Status ElasticContact::CheckCompliance() const {
+  if (rows_.empty()) return absl::OkStatus();
+  const double largest = compliance_.diagonal().maxCoeff();
+  for (Eigen::Index r = 0; r < compliance_.rows(); ++r) {
+    if (compliance_(r, r) > kNoCompliance * largest) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat("contact row ", rows_[static_cast<size_t>(r)],
+                     " cannot move: its vertex slides along that normal; remove the row"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Eigen::VectorXd> ElasticContact::Displacements(
+    std::span<const double> forces) const {
+  const Eigen::Map<const Eigen::VectorXd> l(forces.data(),
+                                            static_cast<Eigen::Index>(forces.size()));
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements,
+                      elastic_.Solve(directions_ * l, Eigen::MatrixXd::Zero(3 * num_constrained_, 1)));
+  return displacements.col(0);
+}
+
+int64_t ElasticContact::bytes_held() const {
+  return (compliance_.size() + gap_columns_.size() + gaps_at_rest_.size()) *
+         static_cast<int64_t>(sizeof(double));
+}
+
+}  // namespace tissueform
