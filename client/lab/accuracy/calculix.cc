@@ -74,6 +74,11 @@ absl::Status CheckLengths(const CalculixProblem& problem) {
     return absl::InvalidArgumentError(absl::StrCat(
         problem.displacements.rows(), " displacements for ", constrained, " constrained vertices"));
   }
+  const auto rows = static_cast<Eigen::Index>(problem.constraints.contact().size());
+  if (problem.bone_motions.size() != rows) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(problem.bone_motions.size(), " bone motions for ", rows, " contact rows"));
+  }
   return absl::OkStatus();
 }
 
@@ -148,10 +153,13 @@ absl::Status ParseResult(const CalculixProblem& problem, const std::string& dat,
                          CalculixResult* result) {
   TF_ASSIGN_OR_RETURN(result->deformed,
                       ParseCalculixDisplacements(dat, problem.mesh.num_vertices()));
-  result->deformed += problem.mesh.positions();
+  const double scale = MotionScale(problem);
+  result->deformed = result->deformed / scale + problem.mesh.positions();
   if (!problem.forces_and_stresses) return absl::OkStatus();
   TF_ASSIGN_OR_RETURN(result->forces, ParseCalculixForces(dat, problem.mesh.num_vertices()));
   TF_ASSIGN_OR_RETURN(result->stresses, ParseCalculixStresses(dat, problem.mesh.num_tets()));
+  result->forces /= scale;
+  result->stresses /= scale;
   return absl::OkStatus();
 }
 

@@ -3,6 +3,7 @@
 
 #include "client/lab/accuracy/calculix_input.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -16,6 +17,9 @@ namespace {
 // Below this a number would need three digits of exponent, which do not fit into a field; no length
 // in mm and no stiffness in Pa that means anything is as small.
 constexpr double kSmallest = 1e-90;
+
+// Pa mm^2: the pull of an open gap element, which cannot be zero.
+constexpr double kGapTension = 1e-9;
 
 std::string Number(double value) {
   return std::abs(value) < kSmallest ? "0" : absl::StrFormat("%.13g", value);
@@ -77,9 +81,76 @@ void AppendBoundary(const CalculixProblem& problem, std::string* text) {
   const std::vector<int32_t>& constrained = problem.constraints.constrained();
   for (size_t c = 0; c < constrained.size(); ++c) {
     for (int axis = 0; axis < 3; ++axis) {
-      const double value = problem.displacements(static_cast<Eigen::Index>(c), axis);
+      const double value =
+          MotionScale(problem) * problem.displacements(static_cast<Eigen::Index>(c), axis);
       absl::StrAppend(text, constrained[c] + 1, ", ", axis + 1, ", ", axis + 1, ", ", Number(value),
                       "\n");
+    }
+  }
+}
+
+// The node of a row's bone.
+Eigen::Index BoneNode(const CalculixProblem& problem, size_t row) {
+  return problem.mesh.num_vertices() + 1 + static_cast<Eigen::Index>(row);
+}
+
+void AppendBoneNodes(const CalculixProblem& problem, std::string* text) {
+  const std::vector<ContactRow>& rows = problem.constraints.contact();
+  if (rows.empty()) return;
+  absl::StrAppend(text, "*NODE, NSET=BONE\n");
+  for (size_t row = 0; row < rows.size(); ++row) {
+    const auto place = problem.mesh.positions().row(rows[row].vertex);
+    absl::StrAppend(text, BoneNode(problem, row), ", ", Number(place[0]), ", ", Number(place[1]),
+                    ", ", Number(place[2]), "\n");
+  }
+}
+
+// n . (u_vertex - u_bone) = 0, by the unknown with the largest coefficient.
+void AppendSliding(const CalculixProblem& problem, size_t row, std::string* text) {
+  const ContactRow& of_row = problem.constraints.contact()[row];
+  Eigen::Index largest = 0;
+  of_row.normal.cwiseAbs().maxCoeff(&largest);
+  absl::StrAppend(text, "*EQUATION\n6\n");
+  for (int i = 0; i < 3; ++i) {
+    const auto axis = static_cast<int>((largest + i) % 3);
+    absl::StrAppend(text, of_row.vertex + 1, ", ", axis + 1, ", ", Number(of_row.normal[axis]),
+                    "\n");
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    absl::StrAppend(text, BoneNode(problem, row), ", ", axis + 1, ", ",
+                    Number(-of_row.normal[axis]), "\n");
+  }
+}
+
+// Closed when gap + n . (u_vertex - u_other) = 0; CalculiX counts from the element's first node.
+void AppendGap(const CalculixProblem& problem, size_t row, std::string* text) {
+  const ContactRow& of_row = problem.constraints.contact()[row];
+  const Eigen::Index other =
+      of_row.other == ContactRow::kBone ? BoneNode(problem, row) : of_row.other + 1;
+  absl::StrAppend(text, "*ELEMENT, TYPE=GAPUNI, ELSET=G", row, "\n",
+                  problem.mesh.num_tets() + 1 + static_cast<Eigen::Index>(row), ", ", other, ", ",
+                  of_row.vertex + 1, "\n*GAP, ELSET=G", row, "\n",
+                  Number(MotionScale(problem) * of_row.gap_mm));
+  for (const double component : of_row.normal) absl::StrAppend(text, ", ", Number(component));
+  absl::StrAppend(text, ", , ", Number(kGapSpring), ", ", Number(kGapTension), "\n");
+}
+
+void AppendContact(const CalculixProblem& problem, std::string* text) {
+  const std::vector<ContactRow>& rows = problem.constraints.contact();
+  for (size_t row = 0; row < rows.size(); ++row) {
+    rows[row].bilateral ? AppendSliding(problem, row, text) : AppendGap(problem, row, text);
+  }
+}
+
+void AppendBoneMotions(const CalculixProblem& problem, std::string* text) {
+  const std::vector<ContactRow>& rows = problem.constraints.contact();
+  for (size_t row = 0; row < rows.size(); ++row) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double value = MotionScale(problem) *
+                           problem.bone_motions[static_cast<Eigen::Index>(row)] *
+                           rows[row].normal[axis];
+      absl::StrAppend(text, BoneNode(problem, row), ", ", axis + 1, ", ", axis + 1, ", ",
+                      Number(value), "\n");
     }
   }
 }
@@ -107,15 +178,38 @@ Positions ConstrainedDisplacements(const TetMesh& mesh, const ConstraintSet& con
   return displacements;
 }
 
+Eigen::VectorXd BoneMotions(const TetMesh& mesh, const ConstraintSet& constraints,
+                            absl::Span<const HandlePose> poses) {
+  const std::vector<ContactRow>& rows = constraints.contact();
+  Eigen::VectorXd motions = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.size()));
+  for (size_t row = 0; row < rows.size(); ++row) {
+    if (rows[row].handle == ContactRow::kFixedBone) continue;
+    const Eigen::Vector3d rest = mesh.positions().row(rows[row].vertex);
+    motions[static_cast<Eigen::Index>(row)] =
+        rows[row].normal.dot(ApplyPose(poses[static_cast<size_t>(rows[row].handle)], rest) - rest);
+  }
+  return motions;
+}
+
+double MotionScale(const CalculixProblem& problem) {
+  const std::vector<ContactRow>& rows = problem.constraints.contact();
+  const bool lifts_off =
+      std::ranges::any_of(rows, [](const ContactRow& row) { return !row.bilateral; });
+  return problem.law == CalculixLaw::kLinear && lifts_off ? kSmallMotion : 1;
+}
+
 std::string CalculixInput(const CalculixProblem& problem) {
-  const bool is_linear = problem.law == CalculixLaw::kLinear;
+  const bool is_linear = problem.law == CalculixLaw::kLinear && MotionScale(problem) == 1;
   std::string text;
   AppendNodes(problem.mesh.positions(), &text);
+  AppendBoneNodes(problem, &text);
   const int tissues = AppendTissues(problem, &text);
+  AppendContact(problem, &text);
   // Increments: first, whole, smallest and largest share of the load.
   absl::StrAppend(&text, is_linear ? "*STEP\n*STATIC\n"
                                    : "*STEP, NLGEOM, INC=1000\n*STATIC\n0.2, 1, 1e-5, 0.5\n");
   AppendBoundary(problem, &text);
+  AppendBoneMotions(problem, &text);
   // The last increment is printed whatever the frequency.
   absl::StrAppend(&text, "*NODE PRINT, NSET=ALL, FREQUENCY=1000000\nU\n");
   if (problem.forces_and_stresses) AppendForcesAndStresses(tissues, &text);

@@ -38,9 +38,9 @@ absl::Status CheckPartners(size_t number, const ContactRow& row,
                            const std::vector<bool>& is_constrained, int num_handles) {
   TF_RETURN_IF_ERROR(CheckVertex(number, row.vertex, is_constrained));
   if (row.handle != ContactRow::kFixedBone && (row.handle < 0 || row.handle >= num_handles)) {
-    return BadRow(number, absl::StrCat("names handle ", row.handle, ", but there are handles 0 to ",
-                                       num_handles - 1, "; the fixed region is ",
-                                       ContactRow::kFixedBone));
+    return BadRow(number,
+                  absl::StrCat("names handle ", row.handle, ", but there are handles 0 to ",
+                               num_handles - 1, "; the fixed region is ", ContactRow::kFixedBone));
   }
   if (row.other == ContactRow::kBone) return absl::OkStatus();
   TF_RETURN_IF_ERROR(CheckVertex(number, row.other, is_constrained));
@@ -55,12 +55,12 @@ absl::Status CheckPartners(size_t number, const ContactRow& row,
 
 absl::Status CheckNumbers(size_t number, const ContactRow& row) {
   if (!(std::abs(row.normal.norm() - 1) <= kRoundingOfNormals)) {
-    return BadRow(number, absl::StrCat("has a normal of length ", row.normal.norm(),
-                                       "; it must be 1"));
+    return BadRow(number,
+                  absl::StrCat("has a normal of length ", row.normal.norm(), "; it must be 1"));
   }
   if (!std::isfinite(row.gap_mm) || row.gap_mm < 0) {
-    return BadRow(number, absl::StrCat("has a gap of ", row.gap_mm,
-                                       " mm; at rest it must be 0 or more"));
+    return BadRow(number,
+                  absl::StrCat("has a gap of ", row.gap_mm, " mm; at rest it must be 0 or more"));
   }
   if (!row.bilateral) return absl::OkStatus();
   if (row.other != ContactRow::kBone) {

@@ -23,8 +23,8 @@ struct ContactRow {
   static constexpr int kFixedBone = -1;
   static constexpr int32_t kBone = -1;
 
-  int32_t vertex = 0;     // a free vertex
-  int32_t other = kBone;  // kBone, or the free vertex on the other lip
+  int32_t vertex = 0;       // a free vertex
+  int32_t other = kBone;    // kBone, or the free vertex on the other lip
   int handle = kFixedBone;  // which bone: kFixedBone (it rests) or the index of a handle
   Eigen::Vector3d normal = Eigen::Vector3d::UnitX();  // of length 1, towards `vertex`
   double gap_mm = 0;                                  // at rest, at least 0

@@ -16,8 +16,7 @@ namespace {
 Eigen::Matrix3d AxesFrom(const std::vector<Eigen::Vector3d>& normals) {
   Eigen::Matrix3d axes;
   axes.col(0) = normals[0].normalized();
-  const Eigen::Vector3d second =
-      normals.size() > 1 ? normals[1] : axes.col(0).unitOrthogonal();
+  const Eigen::Vector3d second = normals.size() > 1 ? normals[1] : axes.col(0).unitOrthogonal();
   axes.col(1) = (second - second.dot(axes.col(0)) * axes.col(0)).normalized();
   axes.col(2) = axes.col(0).cross(axes.col(1));
   if (normals.size() > 2 && normals[2].dot(axes.col(2)) < 0) axes.col(2) = -axes.col(2);

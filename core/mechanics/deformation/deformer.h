@@ -68,7 +68,7 @@ struct ContactAnswer {
 struct Deformation {
   Positions positions;  // #V by 3, mm
   SolveSummary summary;
-  ContactAnswer contact;
+  ContactAnswer contact = {};
 };
 
 // How an answer is sought, for models that iterate.

@@ -55,7 +55,8 @@ void ElasticContact::TakeRows(const TetMesh& mesh, const ConstraintSet& constrai
   Eigen::MatrixXd bone_motions = Eigen::MatrixXd::Zero(num_rows, responses.cols());
   gaps_at_rest_.resize(num_rows);
   for (Eigen::Index r = 0; r < num_rows; ++r) {
-    const ContactRow& row = constraints.contact()[static_cast<size_t>(rows_[static_cast<size_t>(r)])];
+    const ContactRow& row =
+        constraints.contact()[static_cast<size_t>(rows_[static_cast<size_t>(r)])];
     gaps_at_rest_[r] = row.gap_mm;
     AddDirection(row.vertex, row.normal, r, &entries);
     if (row.other != ContactRow::kBone) {
@@ -78,10 +79,9 @@ absl::Status ElasticContact::MakeCompliance(const Cancellation& cancellation) {
   for (Eigen::Index first = 0; first < num_rows; first += kRowsPerPass) {
     TF_RETURN_IF_ERROR(cancellation.Check());
     const Eigen::Index count = std::min(kRowsPerPass, num_rows - first);
-    TF_ASSIGN_OR_RETURN(
-        const Eigen::MatrixXd responses,
-        elastic_.Solve(directions_.middleCols(first, count),
-                       Eigen::MatrixXd::Zero(3 * num_constrained_, count)));
+    TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
+                        elastic_.Solve(directions_.middleCols(first, count),
+                                       Eigen::MatrixXd::Zero(3 * num_constrained_, count)));
     compliance_.middleCols(first, count).noalias() = directions_.transpose() * responses;
   }
   // Two solves differ in their last digits.
@@ -105,8 +105,9 @@ absl::StatusOr<Eigen::VectorXd> ElasticContact::Displacements(
     std::span<const double> forces) const {
   const Eigen::Map<const Eigen::VectorXd> l(forces.data(),
                                             static_cast<Eigen::Index>(forces.size()));
-  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements,
-                      elastic_.Solve(directions_ * l, Eigen::MatrixXd::Zero(3 * num_constrained_, 1)));
+  TF_ASSIGN_OR_RETURN(
+      const Eigen::MatrixXd displacements,
+      elastic_.Solve(directions_ * l, Eigen::MatrixXd::Zero(3 * num_constrained_, 1)));
   return displacements.col(0);
 }
 

@@ -32,8 +32,8 @@ class ElasticContact {
  public:
   // `elastic` and its constraint set must outlive it. Costs one back-substitution a row.
   //
-  // Errors: InvalidArgument (a row that cannot move: its vertices slide along that normal), those of
-  // ElasticSystem::Solve, Cancelled, or what `admission`, which may be empty, says of the bytes.
+  // Errors: InvalidArgument (a row that cannot move: its vertices slide along that normal), those
+  // of ElasticSystem::Solve, Cancelled, or what `admission`, which may be empty, says of the bytes.
   static absl::StatusOr<std::unique_ptr<ElasticContact>> Create(
       const TetMesh& mesh, const ConstraintSet& constraints, const ElasticSystem& elastic,
       const FactorAdmission& admission, const Cancellation& cancellation = {});
@@ -41,7 +41,7 @@ class ElasticContact {
   const std::vector<int32_t>& rows() const { return rows_; }  // indices in the constraint set
   // mm per Pa mm^2; #rows by #rows, symmetric to the bit, positive semi-definite.
   const Eigen::MatrixXd& compliance() const { return compliance_; }
-  const Eigen::MatrixXd& gap_columns() const { return gap_columns_; }  // Q, #rows by 12 #handles
+  const Eigen::MatrixXd& gap_columns() const { return gap_columns_; }    // Q, #rows by 12 #handles
   const Eigen::VectorXd& gaps_at_rest() const { return gaps_at_rest_; }  // g0, mm
 
   // q in mm, without contact.

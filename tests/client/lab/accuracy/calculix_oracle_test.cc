@@ -40,10 +40,11 @@ class CalculixOracleTest : public ::testing::Test {
                                            double poisson_ratio, bool forces_and_stresses) const {
     const CalculixLaw law =
         model == DeformationModel::kLinearElastic ? CalculixLaw::kLinear : CalculixLaw::kNeoHookean;
-    return RunCalculix({problem.mesh, problem.stiffness, poisson_ratio, problem.constraints,
-                        ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses),
-                        law, forces_and_stresses},
-                       folder_);
+    return RunCalculix(
+        {problem.mesh, problem.stiffness, poisson_ratio, problem.constraints,
+         ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses), law,
+         forces_and_stresses, BoneMotions(problem.mesh, problem.constraints, problem.poses)},
+        folder_);
   }
 
   static absl::StatusOr<Positions> Answer(const AccuracyCase& problem, DeformationModel model,
@@ -85,6 +86,54 @@ double LargestMove(const AccuracyCase& problem) {
 // The coarser of the bundled heads: three stiffnesses by tissue.
 absl::StatusOr<AccuracyCase> HeadChin() {
   return CaseOfPlan("head_chin", "", testing::TestDataPath("plans/head_chin/plan.json"));
+}
+
+// The head with rows in place of regions: every second vertex of the handle slides on it, every
+// third fixed vertex may lift off its bone, some of these with a gap at rest.
+AccuracyCase WithContact(const AccuracyCase& problem) {
+  const ConstraintSet& regions = problem.constraints;
+  const auto thin = [&](const std::vector<int32_t>& vertices, size_t step, const ContactRow& like,
+                        std::vector<ContactRow>* rows) {
+    Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+    for (const int32_t v : vertices) middle += problem.mesh.positions().row(v);
+    middle /= static_cast<double>(vertices.size());
+    std::vector<int32_t> left;
+    for (size_t i = 0; i < vertices.size(); ++i) {
+      if (i % step != 0) {
+        left.push_back(vertices[i]);
+        continue;
+      }
+      ContactRow& row = rows->emplace_back(like);
+      row.vertex = vertices[i];
+      row.normal = (problem.mesh.positions().row(row.vertex) - middle).normalized();
+      if (!row.bilateral && i % 2 == 0) row.gap_mm = 0.05;
+    }
+    return left;
+  };
+  std::vector<ContactRow> rows;
+  std::vector<HandleRegion> handles = regions.handles();
+  handles[0].vertices = thin(handles[0].vertices, 2, {.handle = 0, .bilateral = true}, &rows);
+  std::vector<int32_t> fixed = thin(regions.fixed(), 3, {}, &rows);
+  AccuracyCase with = problem;
+  with.constraints =
+      ConstraintSet::Create(problem.mesh, std::move(fixed), std::move(handles), std::move(rows))
+          .value();
+  return with;
+}
+
+TEST_F(CalculixOracleTest, LinearElasticityWithContactEqualsCalculixOnAHead) {
+  ASSERT_OK_AND_ASSIGN(const AccuracyCase head, HeadChin());
+  const AccuracyCase with = WithContact(head);
+  ASSERT_OK_AND_ASSIGN(const double distance,
+                       Distance(with, DeformationModel::kLinearElastic, 0.45));
+  // Of a movement of 10 mm; its share from kSmallMotion, which 1e-4 makes eight times larger.
+  EXPECT_LT(distance, 2e-5);
+  // The rows matter.
+  ASSERT_OK_AND_ASSIGN(const Positions sticking,
+                       Answer(head, DeformationModel::kLinearElastic, 0.45));
+  ASSERT_OK_AND_ASSIGN(const Positions sliding,
+                       Answer(with, DeformationModel::kLinearElastic, 0.45));
+  EXPECT_GT((sticking - sliding).rowwise().norm().maxCoeff(), 0.1);
 }
 
 // CalculiX prints seven digits: up to 5e-7 mm for each coordinate of a move of some millimetres.

@@ -90,7 +90,8 @@ class BlockTest : public ::testing::Test {
 
   std::shared_ptr<MeshPreparation> Prepare(std::vector<int32_t> fixed,
                                            std::vector<HandleRegion> handles) const {
-    auto constraints = ConstraintSet::Create(own_.rows(), std::move(fixed), std::move(handles), rows_);
+    auto constraints =
+        ConstraintSet::Create(own_.rows(), std::move(fixed), std::move(handles), rows_);
     EXPECT_THAT(constraints, IsOk());
     PreparationOptions options;
     options.poisson_ratio = kPoisson;
@@ -123,7 +124,8 @@ class BlockTest : public ::testing::Test {
 };
 
 TEST_F(BlockTest, SlidingWallsGiveTheUniformAnswer) {
-  constrained_ = Where([](const auto& x) { return x.head(2).norm() == 0 && (x.z() == 0 || x.z() == kHeight); });
+  constrained_ = Where(
+      [](const auto& x) { return x.head(2).norm() == 0 && (x.z() == 0 || x.z() == kHeight); });
   ASSERT_EQ(constrained_.size(), 2U);
   AddSlidingSides();
   AddWall([](const auto& x) { return x.z() == 0; }, {0, 0, 1}, {.bilateral = true});
@@ -293,12 +295,13 @@ TEST_F(TwoBlocksTest, GapsAreThoseOfTheDisplacements) {
     const Eigen::Vector3d of_vertex = moved.row(row.vertex);
     if (row.other != ContactRow::kBone) {
       const Eigen::Vector3d of_other = moved.row(row.other);
-      EXPECT_NEAR(row.normal.dot(of_vertex - of_other), answer.contact.gaps_mm[unilateral++], 1e-10);
+      EXPECT_NEAR(row.normal.dot(of_vertex - of_other), answer.contact.gaps_mm[unilateral++],
+                  1e-10);
     } else {
       const Eigen::Vector3d place = preparation_->mesh().positions().row(row.vertex);
-      const Eigen::Vector3d of_bone =
-          row.handle == kTop ? Eigen::Vector3d(ApplyPose(pose, place) - place)
-                             : Eigen::Vector3d::Zero();
+      const Eigen::Vector3d of_bone = row.handle == kTop
+                                          ? Eigen::Vector3d(ApplyPose(pose, place) - place)
+                                          : Eigen::Vector3d::Zero();
       EXPECT_NEAR(row.normal.dot(of_vertex - of_bone), 0, 1e-10) << "it slides";
     }
   }
@@ -335,8 +338,8 @@ TEST(ElasticContactTest, SlidingInNoDirectionIsSticking) {
   const auto fixed = SelectVertices(mesh, [](const auto& v) { return v.z() < 0.5; });
   const auto low = SelectVertices(mesh, [](const auto& v) { return v.z() < 0.5 || v.x() < 0.5; });
   const auto top = SelectVertices(mesh, [](const auto& v) { return v.z() > 7.5 && v.x() > 0.5; });
-  const auto front =
-      SelectVertices(mesh, [](const auto& v) { return v.y() > 2.5 && v.z() > 4 && v.z() < 7.5 && v.x() > 0.5; });
+  const auto front = SelectVertices(
+      mesh, [](const auto& v) { return v.y() > 2.5 && v.z() > 4 && v.z() < 7.5 && v.x() > 0.5; });
   std::vector<int32_t> top_and_front = top;
   top_and_front.insert(top_and_front.end(), front.begin(), front.end());
   const Eigen::Matrix3d axes =
@@ -344,7 +347,8 @@ TEST(ElasticContactTest, SlidingInNoDirectionIsSticking) {
   std::vector<ContactRow> rows;
   const auto add = [&](int32_t vertex, int handle) {
     for (int axis = 0; axis < 3; ++axis) {
-      rows.push_back({.vertex = vertex, .handle = handle, .normal = axes.col(axis), .bilateral = true});
+      rows.push_back(
+          {.vertex = vertex, .handle = handle, .normal = axes.col(axis), .bilateral = true});
     }
   };
   for (const int32_t v : front) add(v, 0);
@@ -357,8 +361,7 @@ TEST(ElasticContactTest, SlidingInNoDirectionIsSticking) {
   const auto sliding = MeshPreparation::Create(
       mesh, stiffness, *ConstraintSet::Create(mesh, fixed, {{"top", top}}, rows), {});
   const HandlePose pose = Pose({0.3, -0.2, 0.1}, {1, 0.5, -0.7}, 1.05);
-  const Positions expected =
-      (*CreateLinearElasticDeformer(*sticking))->Deform({pose})->positions;
+  const Positions expected = (*CreateLinearElasticDeformer(*sticking))->Deform({pose})->positions;
   const Positions found = (*CreateLinearElasticDeformer(*sliding))->Deform({pose})->positions;
   EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-10);
 }
@@ -374,9 +377,9 @@ TEST(ElasticContactTest, AMovementOfEverythingIsThatMovementWithoutAnyForce) {
                     .normal = Eigen::Vector3d(0.3, 0.1, -1).normalized(),
                     .bilateral = bilateral});
   }
-  const auto preparation = MeshPreparation::Create(
-      mesh, Eigen::VectorXd::Constant(mesh.num_tets(), kModulus),
-      *ConstraintSet::Create(mesh, {}, {{"bone", bottom}}, rows), {});
+  const auto preparation =
+      MeshPreparation::Create(mesh, Eigen::VectorXd::Constant(mesh.num_tets(), kModulus),
+                              *ConstraintSet::Create(mesh, {}, {{"bone", bottom}}, rows), {});
   const Deformation answer =
       *(*CreateLinearElasticDeformer(*preparation))->Deform({Pose({0, 0, 0}, {3, -2, 5})});
   const Positions moved = answer.positions - mesh.positions();
@@ -415,8 +418,8 @@ TEST(ElasticContactTest, ARowThatCannotMoveIsRefused) {
   ASSERT_THAT(constraints, IsOk());
   const auto preparation = MeshPreparation::Create(
       mesh, Eigen::VectorXd::Constant(mesh.num_tets(), kModulus), *constraints, {});
-  EXPECT_THAT((*preparation)->Contact(), StatusIs(absl::StatusCode::kInvalidArgument,
-                                                  HasSubstr("contact row 2 cannot move")));
+  EXPECT_THAT((*preparation)->Contact(),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("contact row 2 cannot move")));
 }
 
 }  // namespace
