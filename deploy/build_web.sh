@@ -53,8 +53,8 @@ if ! is_newer "$generated/made" proto/tissueform/v1 deploy/build_web.sh "$web/pa
 fi
 
 # The evaluator of prepared answers, for browsers.
-evaluator=(core/mechanics/answer_evaluator/*.cc core/base/instruction_set.cc)
-evaluator_sources=("$web/wasm" core/mechanics/answer_evaluator core/base/instruction_set.h core/base/instruction_set.cc)
+evaluator=(core/mechanics/answer_evaluator/*.cc core/mechanics/contact/*.cc core/base/instruction_set.cc)
+evaluator_sources=("$web/wasm" core/mechanics/answer_evaluator core/mechanics/contact core/base/instruction_set.h core/base/instruction_set.cc)
 if ! is_newer "$generated/answer_evaluator.wasm" "$generated/made" "${evaluator_sources[@]}"; then
   # wasm-ld is in Debian's lld, the standard library in libc++-14-dev-wasm32 and wasi-libc.
   if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null || [[ ! -e /usr/lib/wasm32-wasi/libc++.a ]]; then

@@ -62,7 +62,8 @@ constexpr size_t kNumNumbers = sizeof(AnswerNumbers) / sizeof(double);
 using NumberList = std::array<double, kNumNumbers>;
 
 uint32_t VersionOf(const PortableAnswers& answers) {
-  return answers.third_lengths.empty() ? 1 : kAnswerFormatVersion;
+  if (!answers.contact_gaps.empty()) return 3;
+  return answers.third_lengths.empty() ? 1 : 2;
 }
 
 // The bytes hold some matrices row by row. Returns the number of columns of such a matrix, 0 for
@@ -79,6 +80,7 @@ size_t MatrixColumns(const AnswerSizes& sizes, uint32_t section) {
       return sizes.pairs;
     case 44:
       return sizes.triples;
+    case 51:
     case 60:
       return 12 * sizes.handles;
     default:

@@ -18,6 +18,7 @@ namespace {
 constexpr double kMaxOfAnything = 1 << 28;  // fits into int32_t, and products of two into size_t
 constexpr double kMaxHandles = 10000;
 constexpr double kMaxDegree = 1000;
+constexpr size_t kMaxContactRows = 1000;  // of which a pose may take seconds at worst
 constexpr size_t kMaxBandVariables = 17;  // 16 tissues and Poisson's ratio
 
 bool IsCount(double value, double least, double most) {
@@ -161,6 +162,21 @@ bool SeriesFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
          answers.probes.size() % (3 * sizes.pairs) == 0 && ThirdOrderFits(answers, sizes);
 }
 
+// Only of linear_elastic. Of the compliance no more is asked than the solver needs to end.
+bool ContactFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
+  const size_t rows = answers.contact_gaps.size();
+  const auto is_negative = [](double gap_mm) { return gap_mm < 0; };
+  if (rows > kMaxContactRows || answers.contact_gap_map.size() != rows * 12 * sizes.handles ||
+      answers.contact_compliance.size() != rows * rows ||
+      std::any_of(answers.contact_gaps.begin(), answers.contact_gaps.end(), is_negative)) {
+    return false;
+  }
+  for (size_t row = 0; row < rows; ++row) {
+    if (answers.contact_compliance[row * (rows + 1)] <= 0) return false;
+  }
+  return rows == 0 || IsModel(answers, AnswerModel::kLinearElastic);
+}
+
 // Only where there are columns of elasticity.
 bool BandFits(const PortableAnswers& answers, const AnswerSizes& sizes, bool is_gradient) {
   const PackedColumns& band = answers.band;
@@ -181,6 +197,7 @@ std::string CheckAnswers(const PortableAnswers& answers) {
   const bool is_gradient = IsModel(answers, AnswerModel::kGradientField);
   const bool is_neo = IsModel(answers, AnswerModel::kNeoHookean);
   if (!HasNothingElse(answers, is_gradient, is_neo)) return "a section belongs to another model";
+  if (!ContactFits(answers, sizes)) return "the contact's sizes do not fit";
   if (!BandFits(answers, sizes, is_gradient)) return "the band's sizes do not fit";
   if (is_gradient && !ExpansionFits(answers, sizes)) return "the expansion's sizes do not fit";
   if (is_neo) {

@@ -8,6 +8,7 @@
 
 #include "core/mechanics/answer_evaluator/answer_pose.h"
 #include "core/mechanics/answer_evaluator/answer_sizes.h"
+#include "core/mechanics/answer_evaluator/contact_forces.h"
 #include "core/mechanics/answer_evaluator/free_vertices.h"
 #include "core/mechanics/answer_evaluator/packed_matrix.h"
 #include "core/mechanics/answer_evaluator/portable_answers.h"
@@ -81,6 +82,7 @@ class BasicAnswerEvaluator {
   PortableAnswers answers_;
   AnswerSizes sizes_;
   VertexPlaces places_;
+  ContactForces contact_;
   FreeVertices<Matrix> free_;
 };
 

@@ -21,7 +21,8 @@ AnswerSizes SizesOf(const PortableAnswers& answers) {
     sizes.nodes = answers.nodes.size() / sizes.handles;
     sizes.factors = 3 * static_cast<size_t>(answers.numbers.num_polynomials) + 4 * sizes.handles;
   } else {
-    sizes.factors = 12 * sizes.handles;
+    sizes.contacts = answers.contact_gaps.size();
+    sizes.factors = 12 * sizes.handles + sizes.contacts;
   }
   if (IsModel(answers, AnswerModel::kNeoHookean)) {
     const size_t numbers = 6 * sizes.handles;

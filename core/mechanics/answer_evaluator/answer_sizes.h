@@ -21,6 +21,7 @@ struct AnswerSizes {
   size_t columns = 0;        // after the map
   size_t full_columns = 0;   // the last ones, with lower halves
   size_t nodes = 0;          // of gradient_field
+  size_t contacts = 0;       // unilateral rows, of linear_elastic
   size_t pairs = 0;          // of neo_hookean
   size_t triples = 0;        // of neo_hookean with a third order
   size_t full_map_cols = 0;  // of neo_hookean

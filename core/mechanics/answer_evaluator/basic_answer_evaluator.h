@@ -22,6 +22,7 @@ BasicAnswerEvaluator<Matrix>::BasicAnswerEvaluator(PortableAnswers answers)
     : answers_(std::move(answers)),
       sizes_(SizesOf(answers_)),
       places_(answers_),
+      contact_(answers_),
       free_(answers_, sizes_) {
   if constexpr (Matrix::kKeepsEntries) {
     for (PackedColumns* packed : {&answers_.columns, &answers_.cluster_map}) {
@@ -94,7 +95,8 @@ typename BasicAnswerEvaluator<Matrix>::Product BasicAnswerEvaluator<Matrix>::Che
 template <typename Matrix>
 typename BasicAnswerEvaluator<Matrix>::Product BasicAnswerEvaluator<Matrix>::ProductOf(
     std::span<const AnswerPose> poses) const {
-  const PoseFactors of_poses = FactorsOf(answers_, poses);
+  PoseFactors of_poses = FactorsOf(answers_, poses);
+  of_poses.model_error_mm += contact_.Append(answers_, &of_poses.factors);
   Product product;
   product.error_mm = of_poses.model_error_mm;
   product.factors = free_.Map(answers_, sizes_, of_poses.factors);

@@ -90,6 +90,13 @@ struct PortableAnswers {
   std::vector<float> third_lengths;
   std::vector<double> third_gains;
 
+  // Of linear_elastic with contact: of every unilateral row the gap at rest (mm), how the 12
+  // #handles coefficients of poses change it, and how forces do (mm per Pa mm^2, symmetric). The
+  // forces are the last factors of the columns.
+  std::vector<double> contact_gaps;
+  std::vector<double> contact_gap_map;     // #rows by 12 #handles
+  std::vector<double> contact_compliance;  // #rows by #rows
+
   // Of the elastic models where ranges of the material are known: how the free vertices' answer
   // changes with each variable, three rows a vertex, those of all variables one after the other;
   // upper halves only. band_map is #columns by 12 #handles.
@@ -129,6 +136,9 @@ void VisitSections(Answers& answers, const Visitor& visit) {
   visit(43, answers.second_lengths);
   visit(44, answers.third_lengths);
   visit(45, answers.third_gains);
+  visit(50, answers.contact_gaps);
+  visit(51, answers.contact_gap_map);
+  visit(52, answers.contact_compliance);
   visit(60, answers.band_map);
   visit(61, answers.band.steps);
   visit(62, answers.band.upper);

@@ -19,6 +19,7 @@ struct PoseFactors {
   // counted in, of linear_elastic nothing.
   double model_error_mm = 0;
 };
+// Without the forces of contact (ContactForces).
 PoseFactors FactorsOf(const PortableAnswers& answers, std::span<const AnswerPose> poses);
 
 // 12 numbers a handle: A and b about the origin of the elastic columns, appended.

@@ -73,20 +73,46 @@ void ElasticContact::TakeRows(const TetMesh& mesh, const ConstraintSet& constrai
   gap_columns_ = directions_.transpose() * responses - bone_motions;
 }
 
-absl::Status ElasticContact::MakeCompliance(const Cancellation& cancellation) {
+absl::Status ElasticContact::SolveForRows(
+    const std::function<void(Eigen::Index first, const Eigen::MatrixXd& responses)>& take,
+    const Cancellation& cancellation) const {
   const Eigen::Index num_rows = directions_.cols();
-  compliance_.resize(num_rows, num_rows);
   for (Eigen::Index first = 0; first < num_rows; first += kRowsPerPass) {
     TF_RETURN_IF_ERROR(cancellation.Check());
     const Eigen::Index count = std::min(kRowsPerPass, num_rows - first);
     TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
                         elastic_.Solve(directions_.middleCols(first, count),
                                        Eigen::MatrixXd::Zero(3 * num_constrained_, count)));
-    compliance_.middleCols(first, count).noalias() = directions_.transpose() * responses;
+    take(first, responses);
   }
+  return absl::OkStatus();
+}
+
+absl::Status ElasticContact::MakeCompliance(const Cancellation& cancellation) {
+  compliance_.resize(directions_.cols(), directions_.cols());
+  TF_RETURN_IF_ERROR(SolveForRows(
+      [this](Eigen::Index first, const Eigen::MatrixXd& responses) {
+        compliance_.middleCols(first, responses.cols()).noalias() =
+            directions_.transpose() * responses;
+      },
+      cancellation));
   // Two solves differ in their last digits.
   compliance_ = (0.5 * (compliance_ + compliance_.transpose())).eval();
   return absl::OkStatus();
+}
+
+absl::StatusOr<Eigen::MatrixXd> ElasticContact::ForceColumns(
+    const std::vector<int32_t>& vertices, const Cancellation& cancellation) const {
+  Eigen::MatrixXd columns(3 * static_cast<Eigen::Index>(vertices.size()), directions_.cols());
+  TF_RETURN_IF_ERROR(SolveForRows(
+      [&](Eigen::Index first, const Eigen::MatrixXd& responses) {
+        for (size_t i = 0; i < vertices.size(); ++i) {
+          columns.block(3 * static_cast<Eigen::Index>(i), first, 3, responses.cols()) =
+              responses.middleRows<3>(3 * Eigen::Index{vertices[i]});
+        }
+      },
+      cancellation));
+  return columns;
 }
 
 absl::Status ElasticContact::CheckCompliance() const {

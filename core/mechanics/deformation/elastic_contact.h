@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -51,6 +52,12 @@ class ElasticContact {
   // K^-1 N^T l, 3 #V in mm, of contact forces in Pa mm^2. Errors: those of ElasticSystem::Solve.
   absl::StatusOr<Eigen::VectorXd> Displacements(std::span<const double> forces) const;
 
+  // Displacements of the vertices by a unit force in every row, K^-1 N^T: 3 #vertices by #rows,
+  // three rows a vertex. Costs one back-substitution a row. Errors: those of ElasticSystem::Solve,
+  // Cancelled.
+  absl::StatusOr<Eigen::MatrixXd> ForceColumns(const std::vector<int32_t>& vertices,
+                                               const Cancellation& cancellation = {}) const;
+
   int64_t bytes_held() const;
 
  private:
@@ -58,6 +65,10 @@ class ElasticContact {
 
   void TakeRows(const TetMesh& mesh, const ConstraintSet& constraints);
   absl::Status MakeCompliance(const Cancellation& cancellation);
+  // Calls take(first row, K^-1 N^T of some rows, 3 #V by their number) until all rows were taken.
+  absl::Status SolveForRows(
+      const std::function<void(Eigen::Index first, const Eigen::MatrixXd& responses)>& take,
+      const Cancellation& cancellation) const;
   absl::Status CheckCompliance() const;
 
   const ElasticSystem& elastic_;

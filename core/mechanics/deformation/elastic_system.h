@@ -15,7 +15,7 @@
 #include "core/base/preparation_progress.h"
 #include "core/mechanics/constraints/constraint_set.h"
 #include "core/mechanics/constraints/handle_pose.h"
-#include "core/mechanics/contact/sliding_basis.h"
+#include "core/mechanics/deformation/sliding_basis.h"
 #include "core/mechanics/linear_solvers/dirichlet_system.h"
 #include "core/mesh/tet_mesh.h"
 

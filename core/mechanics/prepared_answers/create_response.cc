@@ -14,7 +14,10 @@ namespace tissueform {
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const ResponseOptions& options, const Cancellation& cancellation) {
-  TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), "a prepared answer"));
+  const ModelTraits& model = TraitsOf(options.model);
+  if (!model.has_contact) {
+    TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), model.name));
+  }
   if (options.model == DeformationModel::kLinearElastic) {
     return CreateLinearElasticResponse(preparation, vertices,
                                        {.tolerance_mm = options.tolerance_mm,

@@ -3,13 +3,16 @@
 
 #include "core/mechanics/prepared_answers/linear_elastic_response.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/contact/lcp_solver.h"
 #include "core/mechanics/deformation/deformation_checks.h"
+#include "core/mechanics/deformation/elastic_contact.h"
 #include "core/mechanics/prepared_answers/chosen_vertices.h"
 #include "core/mechanics/prepared_answers/compressed_columns.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
@@ -17,9 +20,51 @@
 namespace tissueform {
 namespace {
 
+// Of poses and of unilateral contact.
 Eigen::Index NumColumns(const MeshPreparation& preparation) {
+  const auto lifts_off = [](const ContactRow& row) { return !row.bilateral; };
   return ElasticSystem::kColumnsPerHandle *
-         static_cast<Eigen::Index>(preparation.constraints().handles().size());
+             static_cast<Eigen::Index>(preparation.constraints().handles().size()) +
+         std::ranges::count_if(preparation.constraints().contact(), lifts_off);
+}
+
+// Uses of the poses with the contact forces that they cause below them. A row that no pose presses
+// gets the mean force of the others in one more use, so that its column is not given up.
+Eigen::MatrixXd WithForces(const ElasticContact& contact, const Eigen::MatrixXd& uses) {
+  const auto num_rows = static_cast<Eigen::Index>(contact.rows().size());
+  LcpSolver solver({contact.compliance().data(), static_cast<size_t>(contact.compliance().size())},
+                   contact.rows().size());
+  Eigen::MatrixXd with = Eigen::MatrixXd::Zero(uses.rows() + num_rows, uses.cols() + 1);
+  with.topLeftCorner(uses.rows(), uses.cols()) = uses;
+  for (Eigen::Index use = 0; use < uses.cols(); ++use) {
+    const Eigen::VectorXd gaps = contact.Gaps(uses.col(use));
+    const LcpSolution& solution = solver.Solve({gaps.data(), contact.rows().size()});
+    with.col(use).tail(num_rows) =
+        Eigen::Map<const Eigen::VectorXd>(solution.multipliers.data(), num_rows);
+  }
+  const Eigen::VectorXd means = with.bottomRows(num_rows).rowwise().mean();
+  with.col(uses.cols()).tail(num_rows) =
+      (means.array() > 0).select(0.0, Eigen::VectorXd::Constant(num_rows, means.maxCoeff()));
+  return with;
+}
+
+// Writes the contact of the answers, and gives columns and uses the parts of contact forces.
+absl::Status AddContact(const ElasticContact& contact, const std::vector<int32_t>& free,
+                        const Cancellation& cancellation, PortableAnswers* answers,
+                        Eigen::MatrixXd* columns, ColumnWeights* uses) {
+  const auto list = [](const auto& matrix) {
+    return std::vector<double>(matrix.data(), matrix.data() + matrix.size());
+  };
+  answers->contact_gaps = list(contact.gaps_at_rest());
+  answers->contact_gap_map = list(contact.gap_columns());
+  answers->contact_compliance = list(contact.compliance());
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd of_forces, contact.ForceColumns(free, cancellation));
+  Eigen::MatrixXd both(columns->rows(), columns->cols() + of_forces.cols());
+  both << *columns, of_forces;
+  *columns = std::move(both);
+  uses->typical = WithForces(contact, uses->typical);
+  uses->widest = WithForces(contact, uses->widest);
+  return absl::OkStatus();
 }
 
 Eigen::MatrixXd CoefficientsOf(const ElasticSystem& elastic,
@@ -82,9 +127,13 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
   answers.numbers.max_rotation_rad = options.max_rotation_rad;
   answers.origins.assign(elastic->origin().begin(), elastic->origin().end());
   // Nothing is truncated: 12 columns make every affine motion of a handle.
-  CompressColumns(rest(free, Eigen::all), ColumnRows::kCoordinates,
-                  RowsOfVertices(elastic->response_columns(), free),
-                  ElasticUses(*preparation, *elastic, options.max_rotation_rad),
+  Eigen::MatrixXd columns = RowsOfVertices(elastic->response_columns(), free);
+  ColumnWeights uses = ElasticUses(*preparation, *elastic, options.max_rotation_rad);
+  TF_ASSIGN_OR_RETURN(const ElasticContact* contact, preparation->Contact(cancellation));
+  if (!contact->rows().empty()) {
+    TF_RETURN_IF_ERROR(AddContact(*contact, free, cancellation, &answers, &columns, &uses));
+  }
+  CompressColumns(rest(free, Eigen::all), ColumnRows::kCoordinates, columns, uses,
                   options.tolerance_mm, &answers);
   return std::make_unique<VertexResponse>(std::move(answers),
                                           static_cast<int>(NumColumns(*preparation)));

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "core/mechanics/contact/sliding_basis.h"
+#include "core/mechanics/deformation/sliding_basis.h"
 
 #include <cstddef>
 #include <map>
