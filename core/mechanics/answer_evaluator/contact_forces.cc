@@ -46,8 +46,8 @@ double ContactForces::Append(const PortableAnswers& answers, std::vector<double>
   }
   const LcpSolution& solution = solver->Solve(GapsOf(answers, *factors));
   factors->insert(factors->end(), solution.multipliers.begin(), solution.multipliers.end());
-  const double residual_mm = solution.converged ? solution.kkt_residual_mm
-                                                : std::numeric_limits<double>::infinity();
+  const double residual_mm =
+      solution.converged ? solution.kkt_residual_mm : std::numeric_limits<double>::infinity();
   const std::unique_ptr<LcpSolver> another(spare_->solver.exchange(solver.release()));
   return residual_mm;
 }

@@ -10,9 +10,9 @@
 
 namespace tissueform {
 
-// The forces of unilateral contact as further factors of the columns: with a the coefficients of the
-// poses, gaps of q = gap_map a + gaps without contact, and forces l >= 0 of the LCP
-// g = q + compliance l >= 0, l g = 0 (LcpSolver).
+// The forces of unilateral contact as further factors of the columns: with a the coefficients of
+// the poses, gaps of q = gap_map a + gaps without contact, and forces l >= 0 of the LCP g = q +
+// compliance l >= 0, l g = 0 (LcpSolver).
 //
 // Thread-safe. Forces do not depend on what was asked before.
 class ContactForces {

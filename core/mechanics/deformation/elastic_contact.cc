@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mesh/tet_topology.h"
 
 namespace tissueform {
 namespace {
@@ -27,6 +28,15 @@ void AddDirection(int32_t vertex, const Eigen::Vector3d& normal, Eigen::Index ro
   }
 }
 
+// Three rows a vertex.
+void TakeVertices(const std::vector<int32_t>& vertices, const Eigen::MatrixXd& from,
+                  Eigen::Ref<Eigen::MatrixXd> to) {
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    to.middleRows<3>(3 * static_cast<Eigen::Index>(i)) =
+        from.middleRows<3>(3 * Eigen::Index{vertices[i]});
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ElasticContact>> ElasticContact::Create(
@@ -38,9 +48,12 @@ absl::StatusOr<std::unique_ptr<ElasticContact>> ElasticContact::Create(
     if (!constraints.contact()[row].bilateral) contact->rows_.push_back(static_cast<int32_t>(row));
   }
   const auto num_rows = static_cast<int64_t>(contact->rows_.size());
+  if (num_rows > 0) contact->boundary_ = BoundaryVertices(mesh);
   if (admission) {
-    TF_RETURN_IF_ERROR(admission(num_rows * (num_rows + elastic.response_columns().cols()) *
-                                 static_cast<int64_t>(sizeof(double))));
+    const auto boundary_rows = 3 * static_cast<int64_t>(contact->boundary_.size());
+    TF_RETURN_IF_ERROR(
+        admission(num_rows * (num_rows + elastic.response_columns().cols() + boundary_rows) *
+                  static_cast<int64_t>(sizeof(double))));
   }
   contact->TakeRows(mesh, constraints);
   TF_RETURN_IF_ERROR(contact->MakeCompliance(cancellation));
@@ -90,10 +103,12 @@ absl::Status ElasticContact::SolveForRows(
 
 absl::Status ElasticContact::MakeCompliance(const Cancellation& cancellation) {
   compliance_.resize(directions_.cols(), directions_.cols());
+  boundary_columns_.resize(3 * static_cast<Eigen::Index>(boundary_.size()), directions_.cols());
   TF_RETURN_IF_ERROR(SolveForRows(
       [this](Eigen::Index first, const Eigen::MatrixXd& responses) {
         compliance_.middleCols(first, responses.cols()).noalias() =
             directions_.transpose() * responses;
+        TakeVertices(boundary_, responses, boundary_columns_.middleCols(first, responses.cols()));
       },
       cancellation));
   // Two solves differ in their last digits.
@@ -103,13 +118,20 @@ absl::Status ElasticContact::MakeCompliance(const Cancellation& cancellation) {
 
 absl::StatusOr<Eigen::MatrixXd> ElasticContact::ForceColumns(
     const std::vector<int32_t>& vertices, const Cancellation& cancellation) const {
+  std::vector<int32_t> places;  // in boundary_
+  for (const int32_t vertex : vertices) {
+    const auto place = std::ranges::lower_bound(boundary_, vertex);
+    if (place == boundary_.end() || *place != vertex) break;
+    places.push_back(static_cast<int32_t>(place - boundary_.begin()));
+  }
   Eigen::MatrixXd columns(3 * static_cast<Eigen::Index>(vertices.size()), directions_.cols());
+  if (places.size() == vertices.size()) {
+    TakeVertices(places, boundary_columns_, columns);
+    return columns;
+  }
   TF_RETURN_IF_ERROR(SolveForRows(
       [&](Eigen::Index first, const Eigen::MatrixXd& responses) {
-        for (size_t i = 0; i < vertices.size(); ++i) {
-          columns.block(3 * static_cast<Eigen::Index>(i), first, 3, responses.cols()) =
-              responses.middleRows<3>(3 * Eigen::Index{vertices[i]});
-        }
+        TakeVertices(vertices, responses, columns.middleCols(first, responses.cols()));
       },
       cancellation));
   return columns;
@@ -138,7 +160,8 @@ absl::StatusOr<Eigen::VectorXd> ElasticContact::Displacements(
 }
 
 int64_t ElasticContact::bytes_held() const {
-  return (compliance_.size() + gap_columns_.size() + gaps_at_rest_.size()) *
+  return (compliance_.size() + gap_columns_.size() + gaps_at_rest_.size() +
+          boundary_columns_.size()) *
          static_cast<int64_t>(sizeof(double));
 }
 

@@ -52,9 +52,9 @@ class ElasticContact {
   // K^-1 N^T l, 3 #V in mm, of contact forces in Pa mm^2. Errors: those of ElasticSystem::Solve.
   absl::StatusOr<Eigen::VectorXd> Displacements(std::span<const double> forces) const;
 
-  // Displacements of the vertices by a unit force in every row, K^-1 N^T: 3 #vertices by #rows,
-  // three rows a vertex. Costs one back-substitution a row. Errors: those of ElasticSystem::Solve,
-  // Cancelled.
+  // Displacements of the vertices by a unit force in every row, K^-1 N^T: 3 #vertices by #rows, a
+  // vertex' coordinates in turn. Those of the mesh's boundary are kept; others cost one
+  // back-substitution a row. Errors: those of ElasticSystem::Solve, Cancelled.
   absl::StatusOr<Eigen::MatrixXd> ForceColumns(const std::vector<int32_t>& vertices,
                                                const Cancellation& cancellation = {}) const;
 
@@ -64,6 +64,7 @@ class ElasticContact {
   explicit ElasticContact(const ElasticSystem& elastic) : elastic_(elastic) {}
 
   void TakeRows(const TetMesh& mesh, const ConstraintSet& constraints);
+  // With boundary_columns_.
   absl::Status MakeCompliance(const Cancellation& cancellation);
   // Calls take(first row, K^-1 N^T of some rows, 3 #V by their number) until all rows were taken.
   absl::Status SolveForRows(
@@ -76,6 +77,8 @@ class ElasticContact {
   SparseMatrix directions_;  // N^T, 3 #V by #rows
   Eigen::MatrixXd compliance_;
   Eigen::MatrixXd gap_columns_;
+  std::vector<int32_t> boundary_;     // vertices, rising
+  Eigen::MatrixXd boundary_columns_;  // 3 #boundary by #rows
   Eigen::VectorXd gaps_at_rest_;
   Eigen::Index num_constrained_ = 0;
 };

@@ -28,17 +28,16 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using ::tissueform::testing::Bar;
 using ::tissueform::testing::IsOk;
-using ::tissueform::testing::SelectVertices;
 using ::tissueform::testing::StatusIs;
 
-// A bar on its lower end with a handle at its upper one. One wall slides on fixed bone; a second one
-// touches the handle's bone, a third one fixed bone, in part with a gap.
+// A bar on its lower end with a handle at its upper one. One wall slides on fixed bone; a second
+// one touches the handle's bone, a third one fixed bone, in part with a gap.
 std::shared_ptr<MeshPreparation> PrepareTouchingBar() {
   const TetMesh mesh = Bar({5, 4, 8}, 1.0, 0.15);
   const auto in_the_middle = [](const Eigen::Vector3d& v) { return v.z() > 0.5 && v.z() < 7.5; };
   std::vector<ContactRow> rows;
   const auto add_wall = [&](const Eigen::Vector3d& normal, double from, const ContactRow& like) {
-    for (const int32_t v : SelectVertices(mesh, [&](const Eigen::Vector3d& x) {
+    for (const int32_t v : testing::SelectVertices(mesh, [&](const Eigen::Vector3d& x) {
            return in_the_middle(x) && normal.dot(x) < from;
          })) {
       ContactRow& row = rows.emplace_back(like);
@@ -51,8 +50,8 @@ std::shared_ptr<MeshPreparation> PrepareTouchingBar() {
   add_wall(-Eigen::Vector3d::UnitX(), -4.5, {.handle = 0});
   add_wall(Eigen::Vector3d::UnitY(), 0.5, {});
   const auto constraints = ConstraintSet::Create(
-      mesh, SelectVertices(mesh, [](const auto& v) { return v.z() < 0.5; }),
-      {{"top", SelectVertices(mesh, [](const auto& v) { return v.z() > 7.5; })}}, rows);
+      mesh, testing::SelectVertices(mesh, [](const auto& v) { return v.z() < 0.5; }),
+      {{"top", testing::SelectVertices(mesh, [](const auto& v) { return v.z() > 7.5; })}}, rows);
   EXPECT_THAT(constraints, IsOk());
   return *MeshPreparation::Create(mesh, Eigen::VectorXd::Constant(mesh.num_tets(), 15000.0),
                                   *constraints, {});
@@ -62,7 +61,8 @@ class ContactResponseTest : public ::testing::Test {
  protected:
   ContactResponseTest() : vertices_(static_cast<size_t>(preparation_->mesh().num_vertices())) {
     std::iota(vertices_.begin(), vertices_.end(), 0);
-    response_ = *CreateResponse(preparation_, vertices_, {.model = DeformationModel::kLinearElastic});
+    response_ =
+        *CreateResponse(preparation_, vertices_, {.model = DeformationModel::kLinearElastic});
     std::mt19937 generator(11);
     std::uniform_real_distribution<double> number(-1, 1);
     const auto three = [&](double size) {
@@ -96,7 +96,8 @@ TEST_F(ContactResponseTest, IsTheDirectAnswerWithinItsBound) {
   int in_part = 0;
   for (const HandlePose& pose : poses_) {
     const Deformation direct = *deformer->Deform({pose});
-    const double distance = (Answer(pose).cast<double>() - direct.positions).rowwise().norm().maxCoeff();
+    const double distance =
+        (Answer(pose).cast<double>() - direct.positions).rowwise().norm().maxCoeff();
     EXPECT_LE(distance, response_->ErrorBoundMm({pose}));
     covered += response_->Covers({pose}) ? 1 : 0;
     const auto open = std::ranges::count(direct.contact.forces, 0.0);
@@ -146,8 +147,10 @@ TEST_F(ContactResponseTest, WhatDoesNotFitIsRefused) {
     change(&answers);
     return CheckAnswers(answers);
   };
-  EXPECT_THAT(broken([](auto* answers) { answers->contact_gaps.pop_back(); }), HasSubstr("contact"));
-  EXPECT_THAT(broken([](auto* answers) { answers->contact_gaps[0] = -1e-3; }), HasSubstr("contact"));
+  EXPECT_THAT(broken([](auto* answers) { answers->contact_gaps.pop_back(); }),
+              HasSubstr("contact"));
+  EXPECT_THAT(broken([](auto* answers) { answers->contact_gaps[0] = -1e-3; }),
+              HasSubstr("contact"));
   EXPECT_THAT(broken([](auto* answers) { answers->contact_gap_map.pop_back(); }),
               HasSubstr("contact"));
   EXPECT_THAT(broken([](auto* answers) { answers->contact_compliance[0] = 0; }),
@@ -185,8 +188,9 @@ TEST_F(ContactResponseTest, AComplianceThatIsNoneEnds) {
 TEST_F(ContactResponseTest, ModelsWithoutContactSaySo) {
   for (const DeformationModel model :
        {DeformationModel::kGradientField, DeformationModel::kNeoHookean}) {
-    EXPECT_THAT(CreateResponse(preparation_, vertices_, {.model = model}),
-                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not compute contact")));
+    EXPECT_THAT(
+        CreateResponse(preparation_, vertices_, {.model = model}),
+        StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not compute contact")));
   }
 }
 
