@@ -1,0 +1,341 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/imaging/anatomy/mouth_line.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+#include "core/base/status_macros.h"
+#include "core/imaging/anatomy/grid_operations.h"
+
+namespace tissueform {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kSureShare = 0.8;
+
+// Lips are no higher than that over and under the line between them, and a deeper notch says no
+// more about where they meet.
+constexpr double kLipHeightMm = 8;
+constexpr double kDeepNotchMm = 6;
+// Teeth lie about 10 mm behind the front of a lip. What a ray meets so far behind the foremost of
+// its column is seen between parted lips. That column reaches from a fallen jaw to below the nose.
+constexpr double kPartedMm = 15;
+constexpr double kFallenJawMm = 30;
+constexpr double kBelowNoseMm = 12;
+
+// A step of a millimeter is worth as much as so much notch; steeper than 45 degrees no mouth is.
+constexpr double kCostOfStep = 0.5;
+constexpr int kMaxStepRows = 2;
+
+// The narrowest half of a mouth. A shallow place nearer to the midline is a hair or a scar, and a
+// narrower one farther out, too.
+constexpr double kNarrowestHalfMm = 12;
+constexpr double kShallowStretchMm = 3;
+
+constexpr double kOverIncisorMm = 3;
+constexpr double kEnamelHu = 1400;  // bone of a ridge without teeth stays below
+constexpr double kNearIncisorMm = 4;
+constexpr double kNearMetalMm = 25;
+
+// A relief of what lies about a mouth, with room for the lips of a fallen jaw and wide noses.
+constexpr double kReliefHalfWidthMm = kMouthHalfWidthCapMm + 5;
+constexpr double kReliefFrontMm = 40;
+constexpr double kReliefDepthMm = 90;
+
+enum class Seen { kSkin, kGap, kNothing };
+
+// What a relief shows at a place, as to lips.
+struct Notch {
+  Seen seen = Seen::kNothing;
+  double depth_mm = 0;
+};
+
+// One column of the relief.
+class LipColumn {
+ public:
+  LipColumn(const FaceRelief& relief, Index column, double start_up)
+      : relief_(relief), column_(column) {
+    foremost_ = Foremost(RowAt(start_up - kFallenJawMm), RowAt(start_up + kBelowNoseMm));
+  }
+
+  Index RowAt(double up) const {
+    const double row = (up - relief_.bottom_mm) / relief_.row_mm;
+    return std::clamp<Index>(std::lround(row), 0, relief_.front_mm.rows() - 1);
+  }
+  double Front(Index row) const { return relief_.front_mm(row, column_); }
+
+  Notch At(Index row) const {
+    const double front = Front(row);
+    if (std::isnan(front) || !std::isfinite(foremost_)) return {};
+    if (IsGap(row)) return {Seen::kGap, 0};
+    return {Seen::kSkin, std::min(FrontAbove(row), FrontBelow(row)) - front};
+  }
+  // The point of the line at a row: within a gap, midway between its edges.
+  MouthLinePoint PointAt(Index row) const {
+    MouthLinePoint point;
+    point.at = {relief_.LeftOf(column_), Front(row), relief_.UpOf(row)};
+    const Notch notch = At(row);
+    point.notch_mm = notch.depth_mm;
+    point.parted = notch.seen == Seen::kGap;
+    if (notch.seen == Seen::kNothing) point.at.front = NearestFront(row);
+    if (!point.parted) return point;
+    Index low = row;
+    Index high = row;
+    while (low > 0 && IsGap(low - 1)) --low;
+    while (high + 1 < relief_.front_mm.rows() && IsGap(high + 1)) ++high;
+    point.at.up = (relief_.UpOf(low) + relief_.UpOf(high)) / 2;
+    point.at.front = std::min(FrontAbove(high), FrontBelow(low));
+    if (!std::isfinite(point.at.front)) point.at.front = foremost_;
+    return point;
+  }
+
+ private:
+  bool IsGap(Index row) const { return Front(row) < foremost_ - kPartedMm; }
+  // Infinities and NaN do not count.
+  double Foremost(Index first, Index last) const {
+    double foremost = -std::numeric_limits<double>::infinity();
+    for (Index row = std::max<Index>(first, 0);
+         row <= std::min(last, relief_.front_mm.rows() - 1); ++row) {
+      if (Front(row) > foremost) foremost = Front(row);
+    }
+    return foremost;
+  }
+  Index LipRows() const { return std::lround(kLipHeightMm / relief_.row_mm); }
+  double FrontAbove(Index row) const { return Foremost(row, row + LipRows()); }
+  double FrontBelow(Index row) const { return Foremost(row - LipRows(), row); }
+  double NearestFront(Index row) const {
+    for (Index away = 1; away < relief_.front_mm.rows(); ++away) {
+      const double front = Foremost(row - away, row + away);
+      if (std::isfinite(front)) return front;
+    }
+    return 0;
+  }
+
+  const FaceRelief& relief_;
+  Index column_;
+  double foremost_ = 0;
+};
+
+double GainOf(const Notch& notch) {
+  return notch.seen == Seen::kGap ? kDeepNotchMm : std::min(notch.depth_mm, kDeepNotchMm);
+}
+
+// Rows of the columns from `first` on, along the best path.
+class PathSearch {
+ public:
+  PathSearch(const std::vector<LipColumn>& columns, Index low_row, Index num_rows, double row_mm)
+      : columns_(columns),
+        low_row_(low_row),
+        cost_of_row_(kCostOfStep * row_mm),
+        from_(num_rows, static_cast<Index>(columns.size())),
+        best_(Eigen::ArrayXd::Zero(num_rows)) {}
+
+  std::vector<Index> Run() {
+    for (Index column = 0; column < from_.cols(); ++column) Extend(column);
+    std::vector<Index> rows(columns_.size());
+    Index row = 0;
+    best_.maxCoeff(&row);
+    for (Index column = from_.cols() - 1; column >= 0; --column) {
+      rows[static_cast<size_t>(column)] = low_row_ + row;
+      row = from_(row, column);
+    }
+    return rows;
+  }
+
+ private:
+  void Extend(Index column) {
+    const Eigen::ArrayXd before = best_;
+    for (Index row = 0; row < best_.size(); ++row) {
+      double best = -std::numeric_limits<double>::infinity();
+      const Index last = std::min(row + kMaxStepRows, best_.size() - 1);
+      for (Index other = std::max<Index>(row - kMaxStepRows, 0); other <= last; ++other) {
+        const double score =
+            before[other] - cost_of_row_ * static_cast<double>(std::abs(row - other));
+        // At a tie the straight way, so that a line without a notch stays level.
+        const bool straighter = score == best && other == row;
+        if (!(score > best) && !straighter) continue;
+        best = score;
+        from_(row, column) = other;
+      }
+      best_[row] = best + GainOf(columns_[static_cast<size_t>(column)].At(low_row_ + row));
+    }
+  }
+
+  const std::vector<LipColumn>& columns_;
+  Index low_row_;
+  double cost_of_row_;
+  Eigen::Array<Index, Eigen::Dynamic, Eigen::Dynamic> from_;
+  Eigen::ArrayXd best_;
+};
+
+bool IsMouth(const MouthLinePoint& point) {
+  return point.parted || point.notch_mm >= kShallowNotchMm;
+}
+
+struct CornerFound {
+  size_t index = 0;
+  MouthCornerReason reason = MouthCornerReason::kCapped;
+};
+
+// From the midline outwards, by `step` of +1 or -1. `is_seen` says at which points there is skin.
+CornerFound FindCorner(const std::vector<MouthLinePoint>& points, const std::vector<bool>& is_seen,
+                       size_t middle, int step) {
+  CornerFound corner{.index = middle};
+  for (size_t i = middle; i < points.size(); i += static_cast<size_t>(step)) {
+    const double out_mm = std::abs(points[i].at.left);
+    if (!is_seen[i]) return {corner.index, MouthCornerReason::kSkinNotSeen};
+    const double shallow_mm = out_mm - std::abs(points[corner.index].at.left);
+    if (IsMouth(points[i]) || out_mm <= kNarrowestHalfMm) corner.index = i;
+    if (shallow_mm < kShallowStretchMm) continue;
+    const bool is_notch = IsMouth(points[corner.index]);
+    return {corner.index, is_notch ? MouthCornerReason::kNotchEnds : MouthCornerReason::kNoNotch};
+  }
+  // The last shallow points before the cap are no corner: the notch may go on behind them.
+  corner.index = step > 0 ? points.size() - 1 : 0;
+  return corner;
+}
+
+void KeepBetweenCorners(const std::vector<bool>& is_seen, MouthLine* line) {
+  const size_t middle = line->points.size() / 2;
+  const CornerFound right = FindCorner(line->points, is_seen, middle, -1);
+  const CornerFound left = FindCorner(line->points, is_seen, middle, 1);
+  line->right_corner = right.reason;
+  line->left_corner = left.reason;
+  const auto first = line->points.begin();
+  line->points = {first + static_cast<int64_t>(right.index),
+                  first + static_cast<int64_t>(left.index) + 1};
+  const auto share = [line](auto counts) {
+    const auto count = std::count_if(line->points.begin(), line->points.end(), counts);
+    return static_cast<double>(count) / static_cast<double>(line->points.size());
+  };
+  line->seen_share = share(IsMouth);
+  line->parted_share = share([](const MouthLinePoint& point) { return point.parted; });
+}
+
+bool ShowsTooth(const HeadSegmentation& head, const Eigen::Vector3d& incisor) {
+  const double reach_mm = std::max(kNearIncisorMm, 2 * head.hu.geometry.spacing_mm);
+  bool shows = false;
+  ForEachVoxel(head.bone, [&](size_t index, const Eigen::Vector3d& place) {
+    if ((place - incisor).norm() > reach_mm) return;
+    const bool is_metal = !head.metal.values.empty() && head.metal.values[index] != 0;
+    shows |= is_metal || head.hu.values[index] > kEnamelHu;
+  });
+  return shows;
+}
+
+bool IsNearMetal(const HeadSegmentation& head, const FaceAxes& axes, const MouthLine& line) {
+  std::vector<Eigen::Vector3d> places;
+  for (const MouthLinePoint& point : line.points) places.push_back(axes.Place(point.at));
+  bool is_near = false;
+  ForEachVoxel(head.metal, [&](size_t, const Eigen::Vector3d& metal) {
+    is_near = is_near || std::any_of(places.begin(), places.end(), [&](const auto& place) {
+                return (place - metal).norm() < kNearMetalMm;
+              });
+  });
+  return is_near;
+}
+
+std::string DescribeCorner(const char* side, MouthCornerReason reason, double out_mm) {
+  switch (reason) {
+    case MouthCornerReason::kNotchEnds:
+      return absl::StrFormat(
+          "The %s corner of the mouth, %.0f mm from the midline, was found by the depth of the "
+          "notch between the lips.",
+          side, out_mm);
+    case MouthCornerReason::kNoNotch:
+      return absl::StrFormat(
+          "The %s corner of the mouth is unsure: the skin shows no notch there; the corner was put "
+          "%.0f mm from the midline.",
+          side, out_mm);
+    case MouthCornerReason::kCapped:
+      return absl::StrFormat(
+          "The %s corner of the mouth is unsure: the notch between the lips does not end, so the "
+          "corner was put %.0f mm from the midline.",
+          side, out_mm);
+    case MouthCornerReason::kSkinNotSeen:
+      break;
+  }
+  return absl::StrFormat(
+      "The %s corner of the mouth is unsure: the CT does not show the skin more than %.0f mm from "
+      "the midline.",
+      side, out_mm);
+}
+
+std::string DescribeStart(MouthStart start) {
+  return start == MouthStart::kUpperIncisors
+             ? "3 mm over the edge of the upper incisors"
+             : "midway between the jaws, as the upper front teeth are missing";
+}
+
+}  // namespace
+
+bool MouthLine::line_is_sure() const { return seen_share >= kSureShare; }
+
+absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& relief, double start_up) {
+  std::vector<LipColumn> columns;
+  for (Index column = 0; column < relief.front_mm.cols(); ++column) {
+    if (std::abs(relief.LeftOf(column)) > kMouthHalfWidthCapMm + 1e-6) continue;
+    columns.emplace_back(relief, column, start_up);
+  }
+  if (columns.empty()) return absl::InvalidArgumentError("the skin of the mouth is not in view");
+  const Index low = columns[0].RowAt(start_up - kMouthLineSearchMm);
+  const Index num_rows = columns[0].RowAt(start_up + kMouthLineSearchMm) - low + 1;
+  const std::vector<Index> rows = PathSearch(columns, low, num_rows, relief.row_mm).Run();
+  MouthLine line;
+  line.start_up = start_up;
+  std::vector<bool> is_seen;
+  for (size_t i = 0; i < columns.size(); ++i) {
+    is_seen.push_back(columns[i].At(rows[i]).seen != Seen::kNothing);
+    line.points.push_back(columns[i].PointAt(rows[i]));
+  }
+  if (!is_seen[columns.size() / 2]) {
+    return absl::InvalidArgumentError("the skin of the mouth is not in view");
+  }
+  KeepBetweenCorners(is_seen, &line);
+  return line;
+}
+
+absl::StatusOr<MouthLine> FindMouthLine(const HeadSegmentation& head, const Landmarks& landmarks) {
+  const FaceAxes axes(landmarks);
+  const double upper = axes.Of(landmarks.upper_incisor).up;
+  const double lower = axes.Of(landmarks.lower_incisor).up;
+  const bool has_teeth = ShowsTooth(head, landmarks.upper_incisor);
+  const double start_up = has_teeth ? upper + kOverIncisorMm : (upper + lower) / 2;
+  const FaceRelief relief = MeasureFaceRelief(
+      head, axes,
+      {.half_width_mm = kReliefHalfWidthMm,
+       .bottom_mm = start_up - kFallenJawMm - kLipHeightMm,
+       .top_mm = start_up + kBelowNoseMm + kLipHeightMm,
+       .foremost_mm = axes.Of(landmarks.upper_incisor).front + kReliefFrontMm,
+       .depth_mm = kReliefDepthMm});
+  TF_ASSIGN_OR_RETURN(MouthLine line, FindMouthLine(relief, start_up));
+  line.start = has_teeth ? MouthStart::kUpperIncisors : MouthStart::kJawRidges;
+  line.near_metal = IsNearMetal(head, axes, line);
+  return line;
+}
+
+std::vector<std::string> DescribeMouthLine(const MouthLine& line) {
+  const double width_mm = line.points.back().at.left - line.points.front().at.left;
+  std::string found = absl::StrFormat(
+      "The mouth line %s: lips or a notch of %g mm or more between them are seen along %.0f %% of "
+      "%.0f mm, within %.0f mm of a height %s.",
+      line.line_is_sure() ? "was found" : "is unsure", kShallowNotchMm, 100 * line.seen_share,
+      width_mm, kMouthLineSearchMm, DescribeStart(line.start));
+  if (line.parted_share > 0) {
+    absl::StrAppendFormat(&found, " The lips are apart along %.0f %% of it.",
+                          100 * line.parted_share);
+  }
+  if (line.near_metal) absl::StrAppend(&found, " Metal is near and may blur the skin in the CT.");
+  return {std::move(found),
+          DescribeCorner("right", line.right_corner, -line.points.front().at.left),
+          DescribeCorner("left", line.left_corner, line.points.back().at.left)};
+}
+
+}  // namespace tissueform

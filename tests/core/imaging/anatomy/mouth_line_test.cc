@@ -1,0 +1,92 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/imaging/anatomy/mouth_line.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/testing/status_matchers.h"
+
+namespace tissueform {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::StatusIs;
+
+// A flat face at `front` 60 with a groove 3 mm deep about the height up_of(left), as far out as
+// `half_width_mm`.
+template <typename UpOf>
+FaceRelief GroovedFace(double half_width_mm, UpOf up_of) {
+  FaceRelief relief;
+  relief.right_mm = -35;
+  relief.bottom_mm = -40;
+  relief.front_mm = Eigen::ArrayXXd::Constant(121, 71, 60);
+  for (Eigen::Index column = 0; column < 71; ++column) {
+    const double left = relief.LeftOf(column);
+    if (std::abs(left) > half_width_mm) continue;
+    for (Eigen::Index row = 0; row < 121; ++row) {
+      const double away = std::abs(relief.UpOf(row) - up_of(left));
+      relief.front_mm(row, column) -= std::max(0.0, 3 - away);
+    }
+  }
+  return relief;
+}
+
+TEST(MouthLineTest, FollowsABentNotchToItsCorners) {
+  const auto up_of = [](double left) { return 5 - 0.005 * left * left; };
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(GroovedFace(24, up_of), 0));
+  for (const MouthLinePoint& point : line.points) {
+    EXPECT_NEAR(point.at.up, up_of(point.at.left), 0.5);
+    EXPECT_NEAR(point.at.front, 57, 0.5);
+  }
+  EXPECT_NEAR(line.points.front().at.left, -24, 1);
+  EXPECT_NEAR(line.points.back().at.left, 24, 1);
+  EXPECT_EQ(line.left_corner, MouthCornerReason::kNotchEnds);
+  EXPECT_EQ(line.right_corner, MouthCornerReason::kNotchEnds);
+  EXPECT_TRUE(line.line_is_sure());
+}
+
+TEST(MouthLineTest, ANotchThatGoesOnIsCappedAndUnsure) {
+  ASSERT_OK_AND_ASSIGN(const MouthLine line,
+                       FindMouthLine(GroovedFace(35, [](double) { return 0; }), 0));
+  EXPECT_EQ(line.points.back().at.left, kMouthHalfWidthCapMm);
+  EXPECT_EQ(line.left_corner, MouthCornerReason::kCapped);
+  EXPECT_THAT(DescribeMouthLine(line)[2], HasSubstr("unsure"));
+}
+
+TEST(MouthLineTest, ANotchOutOfReachIsNotTaken) {
+  ASSERT_OK_AND_ASSIGN(const MouthLine line,
+                       FindMouthLine(GroovedFace(30, [](double) { return -16; }), 0));
+  EXPECT_FALSE(line.line_is_sure());
+  EXPECT_EQ(line.left_corner, MouthCornerReason::kNoNotch);
+}
+
+TEST(MouthLineTest, PartedLipsHaveTheirLineMidwayBetweenTheirEdges) {
+  FaceRelief relief = GroovedFace(24, [](double) { return 0; });
+  // Air from 8 mm below the start to 2 mm over it.
+  relief.front_mm.block(64, 25, 21, 21) = -std::numeric_limits<double>::infinity();
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
+  const MouthLinePoint& middle = line.points[line.points.size() / 2];
+  EXPECT_TRUE(middle.parted);
+  EXPECT_EQ(middle.at.up, -3);
+  EXPECT_EQ(middle.at.front, 60);
+}
+
+TEST(MouthLineTest, SkinThatIsNotSeenEndsTheLine) {
+  FaceRelief relief = GroovedFace(24, [](double) { return 0; });
+  relief.front_mm.rightCols(20) = std::numeric_limits<double>::quiet_NaN();
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
+  EXPECT_EQ(line.left_corner, MouthCornerReason::kSkinNotSeen);
+  EXPECT_EQ(line.right_corner, MouthCornerReason::kNotchEnds);
+  relief.front_mm = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(FindMouthLine(relief, 0),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not in view")));
+}
+
+}  // namespace
+}  // namespace tissueform
