@@ -29,8 +29,9 @@ class FrontRays {
   double FrontAt(double left, double up) const {
     const double step_mm = hu_.geometry.spacing_mm / 2;
     double before_hu = kAirHu;
-    for (double depth_mm = 0; depth_mm < extent_.depth_mm; depth_mm += step_mm) {
-      const double front = extent_.foremost_mm - depth_mm;
+    const auto steps = static_cast<int>(extent_.depth_mm / step_mm);
+    for (int step = 0; step < steps; ++step) {
+      const double front = extent_.foremost_mm - step * step_mm;
       const Eigen::Vector3d place = axes_.Place({left, front, up});
       const double hu = IsInside(place) ? Interpolate(hu_, place) : kAirHu;
       if (hu > threshold_hu_) {
@@ -71,9 +72,9 @@ FaceRelief MeasureFaceRelief(const HeadSegmentation& head, const FaceAxes& axes,
   relief.bottom_mm = extent.bottom_mm;
   const auto columns =
       static_cast<Eigen::Index>(std::lround(2 * extent.half_width_mm / relief.column_mm)) + 1;
-  const auto rows = static_cast<Eigen::Index>(
-                        std::lround((extent.top_mm - extent.bottom_mm) / relief.row_mm)) +
-                    1;
+  const auto rows =
+      static_cast<Eigen::Index>(std::lround((extent.top_mm - extent.bottom_mm) / relief.row_mm)) +
+      1;
   relief.front_mm.resize(rows, columns);
   const FrontRays rays(head, axes, extent);
   for (Eigen::Index column = 0; column < columns; ++column) {

@@ -12,10 +12,10 @@ namespace tissueform {
 
 // The front of a face as heights over a regular grid of face coordinates.
 struct FaceRelief {
-  double right_mm = 0;      // `left` of the first column
-  double bottom_mm = 0;     // `up` of the first row
-  double column_mm = 1;     // between columns
-  double row_mm = 0.5;      // between rows
+  double right_mm = 0;   // `left` of the first column
+  double bottom_mm = 0;  // `up` of the first row
+  double column_mm = 1;  // between columns
+  double row_mm = 0.5;   // between rows
   // Rows by columns: `front` of the first skin that a ray from the front meets. Minus infinity
   // where it meets none within the relief's depth; NaN where what it meets is no skin, but the end
   // of the CT.

@@ -101,8 +101,8 @@ class LipColumn {
   // Infinities and NaN do not count.
   double Foremost(Index first, Index last) const {
     double foremost = -std::numeric_limits<double>::infinity();
-    for (Index row = std::max<Index>(first, 0);
-         row <= std::min(last, relief_.front_mm.rows() - 1); ++row) {
+    for (Index row = std::max<Index>(first, 0); row <= std::min(last, relief_.front_mm.rows() - 1);
+         ++row) {
       if (Front(row) > foremost) foremost = Front(row);
     }
     return foremost;
@@ -308,13 +308,13 @@ absl::StatusOr<MouthLine> FindMouthLine(const HeadSegmentation& head, const Land
   const double lower = axes.Of(landmarks.lower_incisor).up;
   const bool has_teeth = ShowsTooth(head, landmarks.upper_incisor);
   const double start_up = has_teeth ? upper + kOverIncisorMm : (upper + lower) / 2;
-  const FaceRelief relief = MeasureFaceRelief(
-      head, axes,
-      {.half_width_mm = kReliefHalfWidthMm,
-       .bottom_mm = start_up - kFallenJawMm - kLipHeightMm,
-       .top_mm = start_up + kBelowNoseMm + kLipHeightMm,
-       .foremost_mm = axes.Of(landmarks.upper_incisor).front + kReliefFrontMm,
-       .depth_mm = kReliefDepthMm});
+  const FaceRelief relief =
+      MeasureFaceRelief(head, axes,
+                        {.half_width_mm = kReliefHalfWidthMm,
+                         .bottom_mm = start_up - kFallenJawMm - kLipHeightMm,
+                         .top_mm = start_up + kBelowNoseMm + kLipHeightMm,
+                         .foremost_mm = axes.Of(landmarks.upper_incisor).front + kReliefFrontMm,
+                         .depth_mm = kReliefDepthMm});
   TF_ASSIGN_OR_RETURN(MouthLine line, FindMouthLine(relief, start_up));
   line.start = has_teeth ? MouthStart::kUpperIncisors : MouthStart::kJawRidges;
   line.near_metal = IsNearMetal(head, axes, line);
