@@ -24,9 +24,13 @@ constexpr double kSureShare = 0.8;
 // more about where they meet.
 constexpr double kLipHeightMm = 8;
 constexpr double kDeepNotchMm = 6;
-// Teeth lie about 10 mm behind the front of a lip. What a ray meets so far behind the foremost of
-// its column is seen between parted lips. That column reaches from a fallen jaw to below the nose.
-constexpr double kPartedMm = 15;
+// The edge of a lip over a gap: the relief falls or rises by so much within 2 mm, even where a CT
+// blurs it. Edges nearer to each other are the two sides of a closed notch.
+constexpr double kLipEdgeMm = 3;
+constexpr double kLipEdgeHeightMm = 2;
+constexpr double kNarrowestGapMm = 4;
+// Deeper than that behind the lips, it does not matter what a ray meets: teeth, tongue or throat.
+constexpr double kInMouthMm = 11;
 constexpr double kFallenJawMm = 30;
 constexpr double kBelowNoseMm = 12;
 
@@ -34,9 +38,12 @@ constexpr double kBelowNoseMm = 12;
 constexpr double kCostOfStep = 0.5;
 constexpr int kMaxStepRows = 2;
 
+// Hairs and the CT's noise differ between columns; lips do not differ by more than that.
+constexpr double kSameSkinMm = 3;
+
 // The narrowest half of a mouth. A shallow place nearer to the midline is a hair or a scar, and a
 // narrower one farther out, too.
-constexpr double kNarrowestHalfMm = 12;
+constexpr double kNarrowestHalfMm = 15;
 constexpr double kShallowStretchMm = 3;
 
 constexpr double kOverIncisorMm = 3;
@@ -49,7 +56,8 @@ constexpr double kReliefHalfWidthMm = kMouthHalfWidthCapMm + 5;
 constexpr double kReliefFrontMm = 40;
 constexpr double kReliefDepthMm = 90;
 
-enum class Seen { kSkin, kGap, kNothing };
+// Untold: one lip ends at a gap, but where the other one begins the relief does not show.
+enum class Seen { kSkin, kGap, kUntold, kNothing };
 
 // What a relief shows at a place, as to lips.
 struct Notch {
@@ -57,12 +65,37 @@ struct Notch {
   double depth_mm = 0;
 };
 
+// A mean with the neighboring columns, where they show the same skin.
+FaceRelief SmoothAlongLeft(const FaceRelief& relief) {
+  FaceRelief smooth = relief;
+  const Index last = relief.front_mm.cols() - 1;
+  for (Index column = 0; column <= last; ++column) {
+    for (Index row = 0; row < relief.front_mm.rows(); ++row) {
+      const double front = relief.front_mm(row, column);
+      double sum = 2 * front;
+      double weight = 2;
+      for (const Index other : {std::max<Index>(column - 1, 0), std::min(column + 1, last)}) {
+        const double beside = relief.front_mm(row, other);
+        // False for infinities and NaN, which stay as they are.
+        if (!(std::abs(beside - front) < kSameSkinMm)) continue;
+        sum += beside;
+        weight += 1;
+      }
+      smooth.front_mm(row, column) = sum / weight;
+    }
+  }
+  return smooth;
+}
+
 // One column of the relief.
 class LipColumn {
  public:
   LipColumn(const FaceRelief& relief, Index column, double start_up)
       : relief_(relief), column_(column) {
     foremost_ = Foremost(RowAt(start_up - kFallenJawMm), RowAt(start_up + kBelowNoseMm));
+    FindGap(RowAt(start_up - kFallenJawMm), RowAt(start_up - kMouthLineSearchMm),
+            RowAt(start_up + kMouthLineSearchMm));
+    notch_low_ = RowAt(start_up - kMouthLineSearchMm);
   }
 
   Index RowAt(double up) const {
@@ -72,42 +105,106 @@ class LipColumn {
   double Front(Index row) const { return relief_.front_mm(row, column_); }
 
   Notch At(Index row) const {
-    const double front = Front(row);
-    if (std::isnan(front) || !std::isfinite(foremost_)) return {};
-    if (IsGap(row)) return {Seen::kGap, 0};
-    return {Seen::kSkin, std::min(FrontAbove(row), FrontBelow(row)) - front};
+    if (std::isnan(Front(row)) || !std::isfinite(foremost_)) return {};
+    if (column_seen_ == Seen::kGap) return {Seen::kGap, 0};
+    if (column_seen_ == Seen::kUntold || !std::isfinite(Front(row))) return {Seen::kUntold, 0};
+    return {Seen::kSkin, BelowChord(row)};
   }
-  // The point of the line at a row: within a gap, midway between its edges.
-  MouthLinePoint PointAt(Index row) const {
+  // What a path is worth that goes through a row.
+  double GainAt(Index row) const {
+    const Notch notch = At(row);
+    if (notch.seen == Seen::kGap) {
+      return kDeepNotchMm - relief_.row_mm * std::abs(static_cast<double>(row) - gap_middle());
+    }
+    return row < notch_low_ ? 0 : std::min(notch.depth_mm, kDeepNotchMm);
+  }
+  // The point of the line at a row, on the skin as measured; at a gap, midway between its edges.
+  MouthLinePoint PointAt(Index row, const FaceRelief& measured) const {
     MouthLinePoint point;
-    point.at = {relief_.LeftOf(column_), Front(row), relief_.UpOf(row)};
+    point.at = {relief_.LeftOf(column_), measured.front_mm(row, column_), relief_.UpOf(row)};
     const Notch notch = At(row);
     point.notch_mm = notch.depth_mm;
     point.parted = notch.seen == Seen::kGap;
-    if (notch.seen == Seen::kNothing) point.at.front = NearestFront(row);
+    if (!std::isfinite(point.at.front)) point.at.front = NearestFront(row);
     if (!point.parted) return point;
-    Index low = row;
-    Index high = row;
-    while (low > 0 && IsGap(low - 1)) --low;
-    while (high + 1 < relief_.front_mm.rows() && IsGap(high + 1)) ++high;
-    point.at.up = (relief_.UpOf(low) + relief_.UpOf(high)) / 2;
-    point.at.front = std::min(FrontAbove(high), FrontBelow(low));
-    if (!std::isfinite(point.at.front)) point.at.front = foremost_;
+    point.at.up = relief_.bottom_mm + gap_middle() * relief_.row_mm;
+    point.at.front = std::min(FrontAbove(static_cast<Index>(std::floor(gap_high_))),
+                              FrontBelow(static_cast<Index>(std::ceil(gap_low_))));
     return point;
   }
 
  private:
-  bool IsGap(Index row) const { return Front(row) < foremost_ - kPartedMm; }
+  struct Edge {
+    double rise_mm = 0;
+    double row = 0;
+  };
+
+  double gap_middle() const { return (gap_low_ + gap_high_) / 2; }
+  Index RowsOf(double mm) const { return std::lround(mm / relief_.row_mm); }
+  double Lip(Index row) const {
+    return std::isnan(Front(row)) ? Front(row) : std::max(Front(row), lip_floor_);
+  }
+
+  // The steepest edge between two rows. `sign` is +1 for one that rises upwards, -1 for one that
+  // falls.
+  Edge SteepestEdge(Index first, Index last, int sign) const {
+    const Index height = RowsOf(kLipEdgeHeightMm);
+    Edge edge;
+    for (Index row = first; row + height <= last; ++row) {
+      const double rise_mm = sign * (Lip(row + height) - Lip(row));
+      // At a tie the place nearer to the gap, for both lips, so that the line stays midway.
+      const bool is_nearer = sign < 0 && rise_mm == edge.rise_mm && rise_mm > 0;
+      if (!(rise_mm > edge.rise_mm) && !is_nearer) continue;
+      edge = {rise_mm, HalfHeight(row, row + height)};
+    }
+    return edge;
+  }
+  // Where the relief crosses the mean of its values at two rows.
+  double HalfHeight(Index low, Index high) const {
+    const double half = (Lip(low) + Lip(high)) / 2;
+    for (Index row = low; row < high; ++row) {
+      const double from = Lip(row) - half;
+      const double to = Lip(row + 1) - half;
+      if (from * to <= 0 && from != to) return static_cast<double>(row) + from / (from - to);
+    }
+    return static_cast<double>(low + high) / 2;
+  }
+  // The upper lip ends within the rows of the search; the lower one begins at any depth below.
+  void FindGap(Index fallen, Index low, Index high) {
+    lip_floor_ = Foremost(low, high + LipRows()) - kInMouthMm;
+    const Edge upper = SteepestEdge(low, high, 1);
+    if (upper.rise_mm < kLipEdgeMm) return;
+    const Edge lower = SteepestEdge(fallen, static_cast<Index>(upper.row), -1);
+    gap_low_ = lower.row;
+    gap_high_ = upper.row;
+    const bool is_told = lower.rise_mm >= kLipEdgeMm;
+    const bool is_closed = is_told && gap_high_ - gap_low_ < kNarrowestGapMm / relief_.row_mm;
+    if (is_closed) return;
+    column_seen_ = is_told ? Seen::kGap : Seen::kUntold;
+  }
+
+  // How far the skin lies behind the chord from the front of the lip above to the one below.
+  double BelowChord(Index row) const {
+    const Index above = ForemostRow(row, row + LipRows());
+    const Index below = ForemostRow(row - LipRows(), row);
+    if (above == row || below == row) return 0;
+    const double share = static_cast<double>(row - below) / static_cast<double>(above - below);
+    return (1 - share) * Front(below) + share * Front(above) - Front(row);
+  }
   // Infinities and NaN do not count.
-  double Foremost(Index first, Index last) const {
-    double foremost = -std::numeric_limits<double>::infinity();
-    for (Index row = std::max<Index>(first, 0); row <= std::min(last, relief_.front_mm.rows() - 1);
-         ++row) {
-      if (Front(row) > foremost) foremost = Front(row);
+  Index ForemostRow(Index first, Index last) const {
+    first = std::max<Index>(first, 0);
+    Index foremost = first;
+    for (Index row = first; row <= std::min(last, relief_.front_mm.rows() - 1); ++row) {
+      if (Front(row) > Front(foremost) || !std::isfinite(Front(foremost))) foremost = row;
     }
     return foremost;
   }
-  Index LipRows() const { return std::lround(kLipHeightMm / relief_.row_mm); }
+  double Foremost(Index first, Index last) const {
+    const double front = Front(ForemostRow(first, last));
+    return std::isfinite(front) ? front : -std::numeric_limits<double>::infinity();
+  }
+  Index LipRows() const { return RowsOf(kLipHeightMm); }
   double FrontAbove(Index row) const { return Foremost(row, row + LipRows()); }
   double FrontBelow(Index row) const { return Foremost(row - LipRows(), row); }
   double NearestFront(Index row) const {
@@ -121,11 +218,12 @@ class LipColumn {
   const FaceRelief& relief_;
   Index column_;
   double foremost_ = 0;
+  Index notch_low_ = 0;
+  Seen column_seen_ = Seen::kSkin;
+  double lip_floor_ = 0;
+  double gap_low_ = 0;  // rows of the edges of the lips
+  double gap_high_ = 0;
 };
-
-double GainOf(const Notch& notch) {
-  return notch.seen == Seen::kGap ? kDeepNotchMm : std::min(notch.depth_mm, kDeepNotchMm);
-}
 
 // Rows of the columns from `first` on, along the best path.
 class PathSearch {
@@ -164,7 +262,7 @@ class PathSearch {
         best = score;
         from_(row, column) = other;
       }
-      best_[row] = best + GainOf(columns_[static_cast<size_t>(column)].At(low_row_ + row));
+      best_[row] = best + columns_[static_cast<size_t>(column)].GainAt(low_row_ + row);
     }
   }
 
@@ -194,7 +292,8 @@ CornerFound FindCorner(const std::vector<MouthLinePoint>& points, const std::vec
     const double shallow_mm = out_mm - std::abs(points[corner.index].at.left);
     if (IsMouth(points[i]) || out_mm <= kNarrowestHalfMm) corner.index = i;
     if (shallow_mm < kShallowStretchMm) continue;
-    const bool is_notch = IsMouth(points[corner.index]);
+    const bool is_notch =
+        IsMouth(points[corner.index]) && std::abs(points[corner.index].at.left) > kNarrowestHalfMm;
     return {corner.index, is_notch ? MouthCornerReason::kNotchEnds : MouthCornerReason::kNoNotch};
   }
   // The last shallow points before the cap are no corner: the notch may go on behind them.
@@ -251,8 +350,8 @@ std::string DescribeCorner(const char* side, MouthCornerReason reason, double ou
           side, out_mm);
     case MouthCornerReason::kNoNotch:
       return absl::StrFormat(
-          "The %s corner of the mouth is unsure: the skin shows no notch there; the corner was put "
-          "%.0f mm from the midline.",
+          "The %s corner of the mouth is unsure: the skin shows no clear end of the notch; the "
+          "corner was put %.0f mm from the midline.",
           side, out_mm);
     case MouthCornerReason::kCapped:
       return absl::StrFormat(
@@ -278,14 +377,15 @@ std::string DescribeStart(MouthStart start) {
 
 bool MouthLine::line_is_sure() const { return seen_share >= kSureShare; }
 
-absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& relief, double start_up) {
+absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& measured, double start_up) {
+  const FaceRelief relief = SmoothAlongLeft(measured);
   std::vector<LipColumn> columns;
   for (Index column = 0; column < relief.front_mm.cols(); ++column) {
     if (std::abs(relief.LeftOf(column)) > kMouthHalfWidthCapMm + 1e-6) continue;
     columns.emplace_back(relief, column, start_up);
   }
   if (columns.empty()) return absl::InvalidArgumentError("the skin of the mouth is not in view");
-  const Index low = columns[0].RowAt(start_up - kMouthLineSearchMm);
+  const Index low = columns[0].RowAt(start_up - kFallenJawMm);
   const Index num_rows = columns[0].RowAt(start_up + kMouthLineSearchMm) - low + 1;
   const std::vector<Index> rows = PathSearch(columns, low, num_rows, relief.row_mm).Run();
   MouthLine line;
@@ -293,7 +393,7 @@ absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& relief, double start_u
   std::vector<bool> is_seen;
   for (size_t i = 0; i < columns.size(); ++i) {
     is_seen.push_back(columns[i].At(rows[i]).seen != Seen::kNothing);
-    line.points.push_back(columns[i].PointAt(rows[i]));
+    line.points.push_back(columns[i].PointAt(rows[i], measured));
   }
   if (!is_seen[columns.size() / 2]) {
     return absl::InvalidArgumentError("the skin of the mouth is not in view");

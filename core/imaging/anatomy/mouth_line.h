@@ -30,14 +30,15 @@ enum class MouthStart {
 // Why the line ends at a corner.
 enum class MouthCornerReason {
   kNotchEnds,    // the notch becomes shallower than 1.5 mm
-  kNoNotch,      // no notch 12 mm from the midline, where every mouth has one: unsure
+  kNoNotch,      // no notch 15 mm from the midline, where every mouth has one, or it ends unseen:
+                 // unsure
   kCapped,       // the notch goes on; the corner is put 30 mm from the midline: unsure
   kSkinNotSeen,  // the CT does not show the skin farther out: unsure
 };
 
 struct MouthLinePoint {
   FaceCoordinates at;
-  double notch_mm = 0;  // how far behind the nearer of the two lips' fronts; 0 where parted
+  double notch_mm = 0;  // how far behind the chord between the two lips' fronts; 0 where parted
   bool parted = false;  // air parts the lips: the point lies midway between their edges
 };
 
