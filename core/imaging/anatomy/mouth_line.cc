@@ -277,6 +277,20 @@ bool IsMouth(const MouthLinePoint& point) {
   return point.parted || point.notch_mm >= kShallowNotchMm;
 }
 
+// Columns with an untold one so near that it blurs where a notch ends.
+std::vector<bool> NearUntold(const std::vector<LipColumn>& columns,
+                             const std::vector<Index>& rows) {
+  const auto reach = static_cast<size_t>(2 * kShallowStretchMm);
+  std::vector<bool> near(columns.size());
+  for (size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i].At(rows[i]).seen != Seen::kUntold) continue;
+    const size_t first = i < reach ? 0 : i - reach;
+    const size_t last = std::min(i + reach, columns.size() - 1);
+    for (size_t other = first; other <= last; ++other) near[other] = true;
+  }
+  return near;
+}
+
 struct CornerFound {
   size_t index = 0;
   MouthCornerReason reason = MouthCornerReason::kCapped;
@@ -284,7 +298,7 @@ struct CornerFound {
 
 // From the midline outwards, by `step` of +1 or -1. `is_seen` says at which points there is skin.
 CornerFound FindCorner(const std::vector<MouthLinePoint>& points, const std::vector<bool>& is_seen,
-                       size_t middle, int step) {
+                       const std::vector<bool>& is_untold, size_t middle, int step) {
   CornerFound corner{.index = middle};
   for (size_t i = middle; i < points.size(); i += static_cast<size_t>(step)) {
     const double out_mm = std::abs(points[i].at.left);
@@ -292,8 +306,9 @@ CornerFound FindCorner(const std::vector<MouthLinePoint>& points, const std::vec
     const double shallow_mm = out_mm - std::abs(points[corner.index].at.left);
     if (IsMouth(points[i]) || out_mm <= kNarrowestHalfMm) corner.index = i;
     if (shallow_mm < kShallowStretchMm) continue;
-    const bool is_notch =
-        IsMouth(points[corner.index]) && std::abs(points[corner.index].at.left) > kNarrowestHalfMm;
+    const bool is_notch = IsMouth(points[corner.index]) &&
+                          std::abs(points[corner.index].at.left) > kNarrowestHalfMm &&
+                          !is_untold[i];
     return {corner.index, is_notch ? MouthCornerReason::kNotchEnds : MouthCornerReason::kNoNotch};
   }
   // The last shallow points before the cap are no corner: the notch may go on behind them.
@@ -301,10 +316,11 @@ CornerFound FindCorner(const std::vector<MouthLinePoint>& points, const std::vec
   return corner;
 }
 
-void KeepBetweenCorners(const std::vector<bool>& is_seen, MouthLine* line) {
+void KeepBetweenCorners(const std::vector<bool>& is_seen, const std::vector<bool>& is_untold,
+                        MouthLine* line) {
   const size_t middle = line->points.size() / 2;
-  const CornerFound right = FindCorner(line->points, is_seen, middle, -1);
-  const CornerFound left = FindCorner(line->points, is_seen, middle, 1);
+  const CornerFound right = FindCorner(line->points, is_seen, is_untold, middle, -1);
+  const CornerFound left = FindCorner(line->points, is_seen, is_untold, middle, 1);
   line->right_corner = right.reason;
   line->left_corner = left.reason;
   const auto first = line->points.begin();
@@ -398,7 +414,7 @@ absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& measured, double start
   if (!is_seen[columns.size() / 2]) {
     return absl::InvalidArgumentError("the skin of the mouth is not in view");
   }
-  KeepBetweenCorners(is_seen, &line);
+  KeepBetweenCorners(is_seen, NearUntold(columns, rows), &line);
   return line;
 }
 
