@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
@@ -31,11 +33,8 @@ constexpr std::array<std::string_view, 9> kOpenToLinks = {
 bool IsBridge(const Principal& caller) { return caller.roles.contains("bridge"); }
 bool IsLink(const Principal& caller) { return !caller.only_session.empty(); }
 
-void Append(const AccessRows& rows, AccessRows* all) {
-  all->shares.insert(all->shares.end(), rows.shares.begin(), rows.shares.end());
-  all->links.insert(all->links.end(), rows.links.begin(), rows.links.end());
-  all->mesh_rights.insert(all->mesh_rights.end(), rows.mesh_rights.begin(), rows.mesh_rights.end());
-}
+// Remembered answers; they are few, and all go when there are more.
+constexpr size_t kMaxRemembered = 10'000;
 
 absl::Status LinkHasEnded() {
   return absl::UnauthenticatedError(
@@ -82,173 +81,180 @@ absl::Status Access::Judge(Level level, Permission need, const absl::Status& not
   return absl::OkStatus();
 }
 
-Access::Level Access::LevelOfShare(const std::string& owner, const std::string& resource,
-                                   const std::string& project, const std::string& principal) const {
-  std::optional<ShareRole> role = table_.RoleOf(owner, resource, principal);
-  if (!project.empty()) {
-    role = std::max(role, table_.RoleOf(owner, ProjectResource(project), principal));
-  }
+Access::Level Access::LevelOf(const std::string& owner, const std::optional<ShareRole>& role,
+                              const Principal& caller) {
+  if (owner == caller.name) return Level::kOwner;
   if (!role.has_value()) return Level::kNothing;
   return *role == ShareRole::kPlanner ? Level::kWrite : Level::kRead;
 }
 
-Access::Level Access::SessionLevel(const Principal& caller, const std::string& id) const {
-  const ResourceIndex::Session* session = index_.FindSession(id);
-  if (session == nullptr) return caller.anonymous() ? Level::kOwner : Level::kNothing;
-  const std::string resource = SessionResource(id);
-  if (IsLink(caller)) {
-    return caller.only_session == resource && HasGoodLink(id) ? Level::kRead : Level::kNothing;
-  }
-  if (session->owner == caller.name) return Level::kOwner;
-  return LevelOfShare(session->owner, resource, session->project, caller.name);
+absl::Status Access::CheckAsked() {
+  MutexLock lock(mutex_);
+  if (std::chrono::steady_clock::now() >= silent_until_) return absl::OkStatus();
+  return absl::UnavailableError("the server's database does not answer; try again in a minute");
 }
 
-Access::Level Access::PredictionLevel(const Principal& caller, const std::string& id) const {
-  const ResourceIndex::Prediction* prediction = index_.FindPrediction(id);
-  if (prediction == nullptr) return caller.anonymous() ? Level::kOwner : Level::kNothing;
+template <typename Answer>
+absl::StatusOr<Answer> Access::Noting(absl::StatusOr<Answer> answer) {
+  const Time now = std::chrono::steady_clock::now();
+  MutexLock lock(mutex_);
+  if (!absl::IsUnavailable(answer.status())) {
+    away_since_.reset();
+  } else {
+    silent_until_ = now + kNotAskedAgain;
+    if (!away_since_.has_value()) away_since_ = now;
+  }
+  return answer;
+}
+
+absl::StatusOr<std::optional<SessionGrant>> Access::AskForSession(const Principal& caller,
+                                                                  const std::string& id) {
+  using Grant = std::optional<SessionGrant>;
+  const std::pair<std::string, std::string> key = {caller.name, id};
+  const Time now = std::chrono::steady_clock::now();
+  const absl::Status asked = CheckAsked();
+  absl::StatusOr<Grant> grant =
+      asked.ok() ? Noting(queries_.FindSession(id, caller.name)) : absl::StatusOr<Grant>(asked);
+  MutexLock lock(mutex_);
+  if (absl::IsUnavailable(grant.status())) {
+    const auto known = sessions_.find(key);
+    if (known == sessions_.end()) return grant;
+    const auto& [remembered, at] = known->second;
+    if (at < away_since_.value_or(now) - kRememberedWhenAway) return grant;
+    return remembered;
+  }
+  TF_RETURN_IF_ERROR(grant.status());
+  if (!grant->has_value()) {
+    sessions_.erase(key);
+  } else {
+    if (sessions_.size() >= kMaxRemembered) sessions_.clear();
+    sessions_[key] = {**grant, now};
+  }
+  return grant;
+}
+
+bool Access::IsGood(const LinkGrant& link) const {
+  return link.link.expires_s > clock_() && link.maker.has_value() &&
+         LevelOf(link.maker->owner, link.maker->role, Principal{.name = link.link.maker}) >=
+             Level::kWrite;
+}
+
+absl::StatusOr<bool> Access::HasGoodLink(const std::string& session) {
+  TF_RETURN_IF_ERROR(CheckAsked());
+  TF_ASSIGN_OR_RETURN(const std::vector<LinkGrant> links, Noting(queries_.LinksOf(session)));
+  return std::ranges::any_of(links, [this](const LinkGrant& link) { return IsGood(link); });
+}
+
+absl::StatusOr<Access::Level> Access::LinkLevel(const Principal& link, const std::string& session) {
+  if (link.only_session != SessionResource(session)) return Level::kNothing;
+  TF_ASSIGN_OR_RETURN(const bool good, HasGoodLink(session));
+  return good ? Level::kRead : Level::kNothing;
+}
+
+absl::StatusOr<std::optional<Access::Level>> Access::SessionLevel(const Principal& caller,
+                                                                  const std::string& id) {
+  TF_ASSIGN_OR_RETURN(const std::optional<SessionGrant> grant, AskForSession(caller, id));
+  if (!grant.has_value()) return std::nullopt;
+  if (!IsLink(caller)) return LevelOf(grant->owner, grant->role, caller);
+  TF_ASSIGN_OR_RETURN(const Level level, LinkLevel(caller, id));
+  return level;
+}
+
+absl::StatusOr<Access::Found> Access::CheckSessionAccess(const Principal& caller,
+                                                         const std::string& id, Permission need) {
+  TF_ASSIGN_OR_RETURN(const std::optional<Level> found, SessionLevel(caller, id));
+  const Level of_none = caller.anonymous() ? Level::kOwner : Level::kNothing;
+  const Level level = found.value_or(of_none);
+  if (level == Level::kNothing && caller.only_session == SessionResource(id)) return LinkHasEnded();
+  TF_RETURN_IF_ERROR(Judge(level, need, NoSuchSession(id)));
+  return found.has_value() ? Found::kYes : Found::kNo;
+}
+
+absl::Status Access::RecheckSessionAccess(const Principal& caller, const std::string& id,
+                                          Permission need) {
+  const absl::StatusOr<std::optional<Level>> found = SessionLevel(caller, id);
+  if (absl::IsUnavailable(found.status())) return absl::OkStatus();
+  TF_RETURN_IF_ERROR(found.status());
+  if (!found->has_value()) return absl::OkStatus();
+  if (**found == Level::kNothing && IsLink(caller)) return LinkHasEnded();
+  return Judge(**found, need, NoSuchSession(id));
+}
+
+absl::StatusOr<std::optional<Access::Level>> Access::PredictionLevel(const Principal& caller,
+                                                                     const std::string& id) {
+  TF_ASSIGN_OR_RETURN(const std::optional<PredictionGrant> grant,
+                      queries_.FindPrediction(id, caller.name));
+  if (!grant.has_value()) return std::nullopt;
   if (IsLink(caller)) return Level::kNothing;
-  if (prediction->owner == caller.name) return Level::kOwner;
-  if (table_.RoleOf(prediction->owner, PredictionResource(id), caller.name).has_value()) {
-    return Level::kRead;
-  }
-  if (IsBridge(caller) && exports_ != nullptr && exports_->IsExported(id)) return Level::kRead;
-  // Only of one owner: an id of a session may have become another's meanwhile.
-  const ResourceIndex::Session* session = index_.FindSession(prediction->session);
-  if (session == nullptr || session->owner != prediction->owner) return Level::kNothing;
-  return std::min(Level::kRead, SessionLevel(caller, prediction->session));
+  if (grant->owner == caller.name) return Level::kOwner;
+  const bool is_exported = IsBridge(caller) && exports_ != nullptr && exports_->IsExported(id);
+  const bool is_shared =
+      grant->role.has_value() || (grant->session.has_value() && grant->session->role.has_value());
+  return is_exported || is_shared ? Level::kRead : Level::kNothing;
 }
 
-bool Access::IsExportedCase(const CaseKey& key) const {
+absl::StatusOr<Access::Found> Access::CheckPredictionAccess(const Principal& caller,
+                                                            const std::string& id,
+                                                            Permission need) {
+  TF_ASSIGN_OR_RETURN(const std::optional<Level> found, PredictionLevel(caller, id));
+  const Level of_none = caller.anonymous() ? Level::kOwner : Level::kNothing;
+  TF_RETURN_IF_ERROR(Judge(found.value_or(of_none), need, NoPrediction(id)));
+  return found.has_value() ? Found::kYes : Found::kNo;
+}
+
+absl::StatusOr<bool> Access::IsExportedCase(const CaseKey& key) {
   if (exports_ == nullptr) return false;
-  for (const std::string& id : exports_->ExportedOfCase(key.sha256)) {
-    const ResourceIndex::Prediction* prediction = index_.FindPrediction(id);
-    if (prediction == nullptr) continue;
+  const std::set<std::string> predictions = exports_->ExportedOfCase(key.sha256);
+  if (predictions.empty()) return false;
+  TF_ASSIGN_OR_RETURN(const std::set<std::string> planners,
+                      queries_.OwnersOfPredictions(predictions));
+  for (const std::string& planner : planners) {
     // Whoever names a case that is not open to them opens it to no bridge.
-    const Principal planner{.name = prediction->owner};
-    if (CaseLevel(planner, key) >= Level::kRead) return true;
+    if (planner == key.owner) return true;
+    TF_ASSIGN_OR_RETURN(const std::vector<CaseGrant> cases,
+                        queries_.FindCases(key.sha256, planner));
+    const auto of_key = std::ranges::find(cases, key, &CaseGrant::key);
+    if (of_key != cases.end() && of_key->role.has_value()) return true;
   }
   return false;
 }
 
-Access::Level Access::CaseLevel(const Principal& caller, const CaseKey& key) const {
-  if (key.owner == caller.name) return Level::kOwner;
-  const ResourceIndex::Case* found = index_.FindCase(key);
-  if (found == nullptr) return Level::kNothing;
-  if (IsBridge(caller) && IsExportedCase(key)) return Level::kRead;
-  return std::min(Level::kRead,
-                  LevelOfShare(key.owner, CaseResource(key.sha256), found->project, caller.name));
-}
-
-Access::Level Access::MeshLevel(const Principal& caller, const std::string& sha256) const {
-  const ShareTable::Holders& holders = table_.HoldersOf(sha256);
-  const bool unclaimed = caller.anonymous() && holders.empty();
-  if (!IsLink(caller) && (unclaimed || holders.contains(caller.name))) return Level::kOwner;
-  for (const std::string& id : index_.SessionsOf(sha256)) {
-    if (SessionLevel(caller, id) >= Level::kRead) return Level::kRead;
-  }
-  for (const std::string& id : index_.PredictionsOf(sha256)) {
-    if (PredictionLevel(caller, id) >= Level::kRead) return Level::kRead;
-  }
-  return Level::kNothing;
-}
-
-bool Access::Knows(const RowName& row) const {
-  switch (row.kind) {
-    case RowName::Kind::kSession:
-      return index_.FindSession(row.name) != nullptr;
-    case RowName::Kind::kPrediction:
-      return index_.FindPrediction(row.name) != nullptr;
-    case RowName::Kind::kCase:
-      return index_.FindCase({.sha256 = row.name, .owner = row.owner}) != nullptr;
-    case RowName::Kind::kMesh:
-      return table_.HasMesh(row.owner, row.name);
-    case RowName::Kind::kLink:
-      return table_.FindLink(row.name) != nullptr;
-  }
-  return true;
-}
-
-absl::Status Access::FetchIfMissing(RowName::Kind kind, const std::string& name,
-                                    const std::string& owner) const {
-  if (reader_ == nullptr) return absl::OkStatus();
-  const RowName row = {.kind = kind, .name = name, .owner = owner};
-  {
-    MutexLock lock(mutex_);
-    if (Knows(row)) return absl::OkStatus();
-  }
-  TF_ASSIGN_OR_RETURN(const FoundRows found, reader_->ReadRow(row));
-  MutexLock lock(mutex_);
-  if (found.session.has_value()) index_.Add(*found.session);
-  if (found.prediction.has_value()) index_.Add(*found.prediction);
-  if (found.of_case.has_value()) index_.Add(*found.of_case);
-  table_.Add(found.access);
-  Append(found.access, &fetched_);
-  return absl::OkStatus();
-}
-
-absl::Status Access::CheckSessionAccess(const Principal& caller, const std::string& id,
-                                        Permission need) const {
-  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kSession, id));
-  MutexLock lock(mutex_);
-  return JudgeSession(caller, id, need);
-}
-
-absl::Status Access::RecheckSessionAccess(const Principal& caller, const std::string& id,
-                                          Permission need) const {
-  MutexLock lock(mutex_);
-  if (index_.FindSession(id) == nullptr) return absl::OkStatus();
-  return JudgeSession(caller, id, need);
-}
-
-absl::Status Access::JudgeSession(const Principal& caller, const std::string& id,
-                                  Permission need) const {
-  if (caller.only_session == SessionResource(id) && !HasGoodLink(id)) return LinkHasEnded();
-  return Judge(SessionLevel(caller, id), need, NoSuchSession(id));
-}
-
-absl::Status Access::CheckPredictionAccess(const Principal& caller, const std::string& id,
-                                           Permission need) const {
-  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kPrediction, id));
-  MutexLock lock(mutex_);
-  return Judge(PredictionLevel(caller, id), need, NoPrediction(id));
-}
-
-absl::StatusOr<CaseKey> Access::CheckCaseAccess(const Principal& caller, const std::string& sha256,
-                                                Permission need) const {
-  const auto found = [&] {
-    MutexLock lock(mutex_);
-    return IsLink(caller) ? CaseOfLink(caller, sha256) : FindCase(caller, sha256, need);
-  };
-  absl::StatusOr<CaseKey> first = found();
-  if (first.ok() || IsLink(caller)) return first;
-  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kCase, sha256, caller.name));
-  return found();
-}
-
 absl::StatusOr<CaseKey> Access::FindCase(const Principal& caller, const std::string& sha256,
-                                         Permission need) const {
-  CaseKey own{.sha256 = sha256, .owner = caller.name};
-  if (caller.anonymous() || index_.FindCase(own) != nullptr) return own;
-  const auto& cases = index_.cases();
-  for (auto next = cases.lower_bound({.sha256 = sha256});
-       next != cases.end() && next->first.sha256 == sha256; ++next) {
-    const Level level = CaseLevel(caller, next->first);
-    if (level == Level::kNothing) continue;
-    TF_RETURN_IF_ERROR(Judge(level, need, NoCase(sha256)));
-    return next->first;
+                                         Permission need) {
+  const CaseKey own = {.sha256 = sha256, .owner = caller.name};
+  if (caller.anonymous()) return own;
+  TF_ASSIGN_OR_RETURN(const std::vector<CaseGrant> cases, queries_.FindCases(sha256, caller.name));
+  if (std::ranges::find(cases, own, &CaseGrant::key) != cases.end()) return own;
+  for (const CaseGrant& grant : cases) {
+    bool looks = grant.role.has_value();
+    if (!looks && IsBridge(caller)) {
+      TF_ASSIGN_OR_RETURN(looks, IsExportedCase(grant.key));
+    }
+    if (!looks) continue;
+    TF_RETURN_IF_ERROR(Judge(Level::kRead, need, NoCase(sha256)));
+    return grant.key;
   }
   return NoCase(sha256);
 }
 
-absl::StatusOr<CaseKey> Access::CaseOfLink(const Principal& link, const std::string& sha256) const {
+absl::StatusOr<CaseKey> Access::CheckCaseAccess(const Principal& caller, const std::string& sha256,
+                                                Permission need) {
+  return IsLink(caller) ? CaseOfLink(caller, sha256) : FindCase(caller, sha256, need);
+}
+
+absl::StatusOr<CaseKey> Access::CaseOfLink(const Principal& link, const std::string& sha256) {
   const std::string session(absl::StripPrefix(link.only_session, kSessionsPrefix));
-  if (!HasGoodLink(session)) return LinkHasEnded();
-  for (const FollowLinkRow& row : table_.LinksOf(session)) {
-    if (row.case_sha256 != sha256 || !IsGood(row)) continue;
+  TF_ASSIGN_OR_RETURN(const std::vector<LinkGrant> links, queries_.LinksOf(session));
+  bool any_good = false;
+  for (const LinkGrant& grant : links) {
+    if (!IsGood(grant)) continue;
+    any_good = true;
+    if (grant.link.case_sha256 != sha256) continue;
     absl::StatusOr<CaseKey> found =
-        FindCase(Principal{.name = row.maker}, sha256, Permission::kRead);
-    if (found.ok()) return found;
+        FindCase(Principal{.name = grant.link.maker}, sha256, Permission::kRead);
+    if (!absl::IsNotFound(found.status())) return found;
   }
+  if (!any_good) return LinkHasEnded();
   return NoCase(sha256);
 }
 
@@ -265,138 +271,121 @@ absl::Status Access::CheckExportAccess(const Principal& caller, const std::strin
   return Judge(level, need, not_found);
 }
 
+absl::StatusOr<Access::Level> Access::MeshLevel(const Principal& caller,
+                                                const std::string& sha256) {
+  if (IsLink(caller)) {
+    const std::string session(absl::StripPrefix(caller.only_session, kSessionsPrefix));
+    TF_ASSIGN_OR_RETURN(const std::optional<SessionGrant> grant, AskForSession(caller, session));
+    if (!grant.has_value() || grant->mesh_sha256 != sha256) return Level::kNothing;
+    return LinkLevel(caller, session);
+  }
+  TF_ASSIGN_OR_RETURN(const MeshUse use, queries_.FindMeshUse(sha256));
+  const bool unclaimed = caller.anonymous() && use.senders.empty();
+  if (unclaimed || use.senders.contains(caller.name)) return Level::kOwner;
+  TF_ASSIGN_OR_RETURN(const bool shown, queries_.IsMeshShown(sha256, caller.name));
+  if (shown) return Level::kRead;
+  if (!IsBridge(caller) || exports_ == nullptr) return Level::kNothing;
+  TF_ASSIGN_OR_RETURN(const std::set<std::string> predictions, queries_.PredictionsOfMesh(sha256));
+  const bool is_exported = std::ranges::any_of(
+      predictions, [this](const std::string& id) { return exports_->IsExported(id); });
+  return is_exported ? Level::kRead : Level::kNothing;
+}
+
 absl::Status Access::CheckMeshAccess(const Principal& caller, const std::string& sha256,
-                                     Permission need) const {
-  const auto judged = [&] {
-    MutexLock lock(mutex_);
-    return Judge(MeshLevel(caller, sha256), need, NoSuchMesh());
-  };
-  const absl::Status first = judged();
-  if (first.ok() || IsLink(caller)) return first;
-  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kMesh, sha256, caller.name));
-  return judged();
+                                     Permission need) {
+  TF_ASSIGN_OR_RETURN(const Level level, MeshLevel(caller, sha256));
+  return Judge(level, need, NoSuchMesh());
 }
 
-bool Access::OthersHoldMesh(const Principal& caller, const std::string& sha256) const {
-  MutexLock lock(mutex_);
-  const ShareTable::Holders& holders = table_.HoldersOf(sha256);
-  if (holders.size() > (holders.contains(caller.name) ? 1U : 0U)) return true;
-  for (const std::string& id : index_.SessionsOf(sha256)) {
-    if (index_.FindSession(id)->owner != caller.name) return true;
-  }
-  return false;
+absl::StatusOr<std::optional<std::set<std::string>>> Access::MeshesNear(const Principal& caller) {
+  if (caller.anonymous() || IsBridge(caller)) return std::nullopt;
+  return queries_.MeshesNear(caller.name);
 }
 
-int Access::CountSessionsOf(const Principal& caller, const std::string& mesh) const {
-  MutexLock lock(mutex_);
-  int count = 0;
-  for (const std::string& id : index_.SessionsOf(mesh)) {
-    count += index_.FindSession(id)->owner == caller.name ? 1 : 0;
-  }
-  return count;
+absl::StatusOr<std::set<std::string>> Access::SharedSessions(const Principal& caller) {
+  return queries_.SharedSessions(caller.name);
 }
 
-std::set<std::string> Access::SharedSessions(const Principal& caller) const {
-  std::set<std::string> shared;
-  MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name)) return shared;
-  for (const auto& [id, session] : index_.sessions()) {
-    const Level level = SessionLevel(caller, id);
-    if (level != Level::kNothing && level != Level::kOwner) shared.insert(id);
-  }
+absl::StatusOr<std::set<std::string>> Access::SharedPredictions(const Principal& caller) {
+  TF_ASSIGN_OR_RETURN(std::set<std::string> shared, queries_.SharedPredictions(caller.name));
+  if (IsBridge(caller) && exports_ != nullptr) shared.merge(exports_->Exported());
   return shared;
 }
 
-std::set<std::string> Access::SharedPredictions(const Principal& caller) const {
-  std::set<std::string> shared;
-  MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
-  for (const auto& [id, prediction] : index_.predictions()) {
-    if (PredictionLevel(caller, id) == Level::kRead) shared.insert(id);
+absl::StatusOr<std::set<CaseKey>> Access::ExportedCases() {
+  std::set<CaseKey> exported;
+  for (const std::string& sha256 : exports_->ExportedCases()) {
+    TF_ASSIGN_OR_RETURN(const std::vector<CaseGrant> cases, queries_.FindCases(sha256, ""));
+    for (const CaseGrant& found : cases) {
+      TF_ASSIGN_OR_RETURN(const bool open, IsExportedCase(found.key));
+      if (open) exported.insert(found.key);
+    }
   }
-  return shared;
+  return exported;
 }
 
-std::set<CaseKey> Access::SharedCases(const Principal& caller) const {
+absl::StatusOr<std::set<CaseKey>> Access::SharedCases(const Principal& caller) {
+  TF_ASSIGN_OR_RETURN(std::set<CaseKey> open, queries_.SharedCases(caller.name));
+  if (IsBridge(caller) && exports_ != nullptr) {
+    TF_ASSIGN_OR_RETURN(std::set<CaseKey> exported, ExportedCases());
+    open.merge(exported);
+  }
   std::set<CaseKey> shared;
-  MutexLock lock(mutex_);
-  if (!table_.HasAny(caller.name) && !IsBridge(caller)) return shared;
-  for (const auto& [key, of_case] : index_.cases()) {
-    const absl::StatusOr<CaseKey> found = FindCase(caller, key.sha256, Permission::kRead);
-    if (found.ok() && found->owner != caller.name) shared.insert(*found);
+  std::string last;
+  for (const CaseKey& key : open) {
+    if (key.sha256 == std::exchange(last, key.sha256)) continue;
+    TF_ASSIGN_OR_RETURN(const std::vector<CaseGrant> all,
+                        queries_.FindCases(key.sha256, caller.name));
+    const CaseKey own = {.sha256 = key.sha256, .owner = caller.name};
+    if (std::ranges::find(all, own, &CaseGrant::key) == all.end()) shared.insert(key);
   }
   return shared;
 }
 
-bool Access::IsGood(const FollowLinkRow& link) const {
-  return link.expires_s > clock_() && index_.FindSession(link.session) != nullptr &&
-         SessionLevel(Principal{.name = link.maker}, link.session) >= Level::kWrite;
-}
-
-bool Access::HasGoodLink(const std::string& session) const {
-  for (const FollowLinkRow& link : table_.LinksOf(session)) {
-    if (IsGood(link)) return true;
+absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) {
+  const Time now = std::chrono::steady_clock::now();
+  int64_t forgotten = 0;
+  {
+    MutexLock lock(mutex_);
+    forgotten = links_forgotten_;
+    const auto known = links_.find(digest);
+    if (known != links_.end() && now - known->second.second < kLinkRemembered &&
+        known->second.first.expires_s > clock_()) {
+      return known->second.first;
+    }
   }
-  return false;
-}
-
-absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) const {
-  TF_RETURN_IF_ERROR(FetchIfMissing(RowName::Kind::kLink, digest));
+  TF_RETURN_IF_ERROR(CheckAsked());
+  TF_ASSIGN_OR_RETURN(const std::optional<LinkGrant> found, Noting(queries_.FindLink(digest)));
+  if (!found.has_value() || !IsGood(*found)) return LinkHasEnded();
   MutexLock lock(mutex_);
-  return GoodLink(digest);
+  if (links_.size() >= kMaxRemembered) links_.clear();
+  if (forgotten == links_forgotten_) links_[digest] = {found->link, now};
+  return found->link;
 }
 
-absl::Status Access::RecheckLink(const std::string& digest) const {
+void Access::ForgetLinks() {
   MutexLock lock(mutex_);
-  return GoodLink(digest).status();
+  links_.clear();
+  ++links_forgotten_;
 }
 
-absl::StatusOr<FollowLinkRow> Access::GoodLink(const std::string& digest) const {
-  const FollowLinkRow* link = table_.FindLink(digest);
-  if (link == nullptr || !IsGood(*link)) return LinkHasEnded();
-  return *link;
+absl::Status Access::RecheckLink(const std::string& digest) {
+  const absl::Status status = FindLink(digest).status();
+  return absl::IsUnavailable(status) ? absl::OkStatus() : status;
 }
 
-std::map<std::string, Access::Holdings> Access::HoldingsByOwner() const {
-  MutexLock lock(mutex_);
-  std::map<std::string, Holdings> holdings = index_.holdings();
-  for (const auto& [principal, bytes] : table_.mesh_bytes()) holdings[principal].bytes += bytes;
-  return holdings;
+absl::StatusOr<std::map<std::string, Holdings>> Access::HoldingsByOwner() {
+  return queries_.HoldingsByOwner();
 }
 
-absl::Status Access::CheckStorageQuota(const Principal& caller, int64_t bytes) const {
+absl::Status Access::CheckStorageQuota(const Principal& caller, int64_t bytes) {
   // A deleted file is gone in a moment.
   constexpr std::chrono::seconds kUntilDeleted{5};
   if (most_bytes_ == 0 || caller.anonymous()) return absl::OkStatus();
-  int64_t held = 0;
-  {
-    MutexLock lock(mutex_);
-    const auto own = index_.holdings().find(caller.name);
-    if (own != index_.holdings().end()) held += own->second.bytes;
-    const auto meshes = table_.mesh_bytes().find(caller.name);
-    if (meshes != table_.mesh_bytes().end()) held += meshes->second;
-  }
-  if (bytes <= most_bytes_ - held) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const Holdings held, queries_.HoldingsOf(caller.name));
+  if (bytes <= most_bytes_ - held.bytes) return absl::OkStatus();
   return QuotaExceeded("MiB of meshes, cases and predictions", "disk-mib", most_bytes_ >> 20,
                        kUntilDeleted);
-}
-
-bool Access::KnowsSession(const std::string& id) const {
-  FetchIfMissing(RowName::Kind::kSession, id).IgnoreError();
-  MutexLock lock(mutex_);
-  return index_.FindSession(id) != nullptr;
-}
-
-bool Access::KnowsPrediction(const std::string& id) const {
-  FetchIfMissing(RowName::Kind::kPrediction, id).IgnoreError();
-  MutexLock lock(mutex_);
-  return index_.FindPrediction(id) != nullptr;
-}
-
-std::string Access::OwnerOf(const std::string& session) const {
-  MutexLock lock(mutex_);
-  const ResourceIndex::Session* found = index_.FindSession(session);
-  return found == nullptr ? "" : found->owner;
 }
 
 }  // namespace tissueform

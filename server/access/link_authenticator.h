@@ -24,14 +24,13 @@ std::string DigestOfLinkToken(absl::string_view token);
 class LinkAuthenticator final : public Authenticator {
  public:
   // Both must outlive it.
-  LinkAuthenticator(const Access* access, Authenticator* others)
-      : access_(access), others_(others) {}
+  LinkAuthenticator(Access* access, Authenticator* others) : access_(access), others_(others) {}
 
   absl::StatusOr<Authenticated> Authenticate(const Credentials& credentials) override;
   absl::Status IsStillAuthorized(const Authenticated& authenticated) override;
 
  private:
-  const Access* const access_;
+  Access* const access_;
   Authenticator* const others_;
 };
 

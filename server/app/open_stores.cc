@@ -13,8 +13,8 @@
 #include "core/base/status_macros.h"
 #include "server/platform/storage/data_folder.h"
 #include "server/session/worker_pool.h"
-#include "server/store/access_store/sql_access_store.h"
 #include "server/store/durable_store.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/sql_stores.h"
 
 namespace tissueform {

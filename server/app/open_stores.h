@@ -10,8 +10,8 @@
 
 #include "server/app/server_options.h"
 #include "server/exports/export_store.h"
-#include "server/store/access_store/access_store.h"
 #include "server/store/postgres_store/postgres_stores.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/stores.h"
 
 namespace tissueform {
@@ -20,7 +20,7 @@ namespace tissueform {
 struct OpenedStores {
   std::unique_ptr<Stores> stores;
   PostgresStores* shared = nullptr;  // the same, where several servers use it
-  std::unique_ptr<AccessStore> access;
+  std::unique_ptr<SqlAccessStore> access;
   std::unique_ptr<ExportStore> exports;
 };
 

@@ -19,7 +19,6 @@
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
-#include "server/access/observed_stores.h"
 #include "server/app/library_logs.h"
 #include "server/app/number_options.h"
 #include "server/platform/network_address.h"
@@ -127,12 +126,9 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
 }
 
 absl::Status TissueformServer::LoadIndex() {
-  TF_RETURN_IF_ERROR(access_changes_.LoadAll());
-  TF_RETURN_IF_ERROR(NotifyExisting(stores_.get(), &access_changes_));
-  // Another server may have made a prediction since; what is not known to be gone stays.
+  // What is not known to be gone stays.
   TF_RETURN_IF_ERROR(exports_.LoadAll([&](const std::string& id) {
-    return access_.KnowsPrediction(id) ||
-           !absl::IsNotFound(stores_->predictions().Get(id).status());
+    return !absl::IsNotFound(stores_->predictions().Get(id).status());
   }));
   TF_RETURN_IF_ERROR(registry_.sync().LearnAll());
   return absl::OkStatus();
@@ -148,7 +144,9 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       export_store_(std::move(parts.opened.exports)),
       exports_(options.exports, export_store_.get(), [this] { return stores_->NowS(); }),
       export_watches_(options.exports.max_watches),
-      access_([this] { return stores_->NowS(); }, &exports_),
+      access_queries_(&parts.opened.stores->database()),
+      access_(
+          &access_queries_, [this] { return stores_->NowS(); }, &exports_),
       access_changes_(options.access, access_store_.get(), &access_),
       authenticator_(parts.authenticator == nullptr
                          ? nullptr
@@ -161,7 +159,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
              .gateway_name = options.tls.gateway_name,
              .node_name = cluster_ == nullptr ? "" : cluster_->name()}),
       budget_(options.memory_budget_bytes),
-      stores_(WatchStores(std::move(parts.opened.stores), &access_changes_)),
+      stores_(std::move(parts.opened.stores)),
       catalog_(options.limits, &budget_, stores_->keeps() ? &stores_->meshes() : nullptr,
                Clock::System(), [stores = stores_.get()] { return stores->NowS(); }),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
@@ -195,20 +193,20 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
     telemetry_->session_events().Count(event);
     streams_.OnSessionEvent(id, event);
     watches_.OnSessionEvent(id, event);
+    access_.ForgetLinks();
   });
-  catalog_.set_on_removed(
-      [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
+  // A store that keeps meshes removes the rights with them.
+  if (!stores_->keeps()) {
+    catalog_.set_on_removed(
+        [this](const std::string& sha256) { access_changes_.MeshRemoved(sha256); });
+  }
   exports_.set_on_changed(
       [this](const ExportRecord& record) { export_watches_.OnChanged(record); });
   access_.set_most_bytes(options.quotas.disk_bytes);
   registry_.table().set_max_of_owner(options.quotas.sessions);
   budget_.set_account_limit(MemoryQuota(options));
   if (cluster_ != nullptr) {
-    cluster_->Join({.access = &access_changes_,
-                    .sessions = &registry_,
-                    .meshes = &catalog_,
-                    .exports = &exports_},
-                   &access_);
+    cluster_->Join({.sessions = &registry_, .meshes = &catalog_, .exports = &exports_});
   }
 }
 

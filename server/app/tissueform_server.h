@@ -45,7 +45,8 @@
 #include "server/session/mesh_uploads.h"
 #include "server/session/session_registry.h"
 #include "server/session/worker_pool.h"
-#include "server/store/access_store/access_store.h"
+#include "server/store/access_queries.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/stores.h"
 #include "server/telemetry/telemetry.h"
 
@@ -129,10 +130,11 @@ class TissueformServer {
   const std::unique_ptr<RotatedFiles> tls_files_;  // null without TLS
   const std::unique_ptr<TokenAuthenticator> tokens_;
   CallQuotas quotas_;
-  std::unique_ptr<AccessStore> access_store_;  // its rows are those of the stores
-  std::unique_ptr<ExportStore> export_store_;  // as access_store_
+  std::unique_ptr<SqlAccessStore> access_store_;  // its rows are those of the stores
+  std::unique_ptr<ExportStore> export_store_;     // as access_store_
   ExportQueue exports_;
   ExportWatches export_watches_;
+  AccessQueries access_queries_;  // of the rows of the stores
   Access access_;
   AccessChanges access_changes_;
   std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in

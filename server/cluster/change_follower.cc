@@ -103,16 +103,8 @@ absl::Status ChangeFollower::Apply(const StoreChange& change) {
     case Kind::kSessionChanged:
     case Kind::kSessionDeleted:
       return LookAtSession(change.name);
-    case Kind::kPredictionCreated:
-    case Kind::kPredictionDeleted:
-      return LookAtPrediction(change.name);
-    case Kind::kCaseCreated:
-    case Kind::kCaseDeleted:
-      return LookAtCase({.sha256 = change.name, .owner = change.owner});
     case Kind::kMeshDeleted:
       return LookAtMesh(change.name);
-    case Kind::kAccessChanged:
-      return rooms_.access->ReloadRows();
     case Kind::kExportsChanged:
       return rooms_.exports->ReloadRows();
     case Kind::kMissed:
@@ -124,35 +116,11 @@ absl::Status ChangeFollower::Apply(const StoreChange& change) {
 absl::Status ChangeFollower::LookAtSession(const std::string& id) {
   const absl::StatusOr<SessionRecord> record = GetRecord(rooms_.stores->sessions(), id);
   if (record.ok()) {
-    rooms_.access->Added(*record);
     rooms_.sessions->sync().OnChanged(*record);
     return absl::OkStatus();
   }
   if (!absl::IsNotFound(record.status())) return record.status();
-  rooms_.access->SessionGone(id);
   rooms_.sessions->sync().OnDeleted(id);
-  return absl::OkStatus();
-}
-
-absl::Status ChangeFollower::LookAtPrediction(const std::string& id) {
-  const absl::StatusOr<PredictionRecord> record = rooms_.stores->predictions().Get(id);
-  if (record.ok()) {
-    rooms_.access->Added(*record);
-    return absl::OkStatus();
-  }
-  if (!absl::IsNotFound(record.status())) return record.status();
-  rooms_.access->PredictionGone(id);
-  return absl::OkStatus();
-}
-
-absl::Status ChangeFollower::LookAtCase(const CaseKey& key) {
-  const absl::StatusOr<CaseRecord> record = rooms_.stores->cases().Find(key);
-  if (record.ok()) {
-    rooms_.access->Added(*record);
-    return absl::OkStatus();
-  }
-  if (!absl::IsNotFound(record.status())) return record.status();
-  rooms_.access->CaseGone(key);
   return absl::OkStatus();
 }
 
@@ -165,13 +133,10 @@ absl::Status ChangeFollower::LookAtMesh(const std::string& sha256) {
 
 absl::Status ChangeFollower::ResyncAll() {
   // What comes to be known from here on has come after what is read.
-  const AccessChanges::Known known = rooms_.access->AllKnown();
+  const std::vector<std::string> known = rooms_.sessions->table().KnownIds();
   const std::vector<std::string> meshes = rooms_.meshes->HeldNames();
-  TF_RETURN_IF_ERROR(LookAtAllSessions(known.sessions));
-  TF_RETURN_IF_ERROR(LookAtAllPredictions(known.predictions));
-  TF_RETURN_IF_ERROR(LookAtAllCases(known.cases));
+  TF_RETURN_IF_ERROR(LookAtAllSessions(known));
   for (const std::string& sha256 : meshes) TF_RETURN_IF_ERROR(LookAtMesh(sha256));
-  TF_RETURN_IF_ERROR(rooms_.access->ReloadRows());
   return rooms_.exports->ReloadRows();
 }
 
@@ -186,43 +151,11 @@ absl::Status ChangeFollower::LookAtAllSessions(const std::vector<std::string>& k
         }));
     for (const SessionRecord& record : page.records) {
       gone.erase(record.id);
-      rooms_.access->Added(record);
       rooms_.sessions->sync().OnChanged(record);
     }
     request.after = std::move(page.next);
   } while (!request.after.empty());
-  for (const std::string& id : gone) {
-    rooms_.access->SessionGone(id);
-    rooms_.sessions->sync().OnDeleted(id);
-  }
-  return absl::OkStatus();
-}
-
-absl::Status ChangeFollower::LookAtAllPredictions(const std::vector<std::string>& known) {
-  std::set<std::string> gone(known.begin(), known.end());
-  PredictionStore::ListRequest request{.limit = kPageOfAll};
-  do {
-    TF_ASSIGN_OR_RETURN(PredictionStore::Page page, rooms_.stores->predictions().List(request));
-    for (const PredictionRecord& record : page.records) {
-      gone.erase(record.id);
-      rooms_.access->Added(record);
-    }
-    request.after = std::move(page.next);
-  } while (!request.after.empty());
-  for (const std::string& id : gone) rooms_.access->PredictionGone(id);
-  return absl::OkStatus();
-}
-
-absl::Status ChangeFollower::LookAtAllCases(const std::vector<CaseKey>& known) {
-  std::set<CaseKey> gone(known.begin(), known.end());
-  // All at once: those of one name may not be parted.
-  TF_ASSIGN_OR_RETURN(const CaseStore::Page page,
-                      rooms_.stores->cases().List({.limit = std::numeric_limits<int>::max()}));
-  for (const CaseRecord& record : page.records) {
-    gone.erase(record.key());
-    rooms_.access->Added(record);
-  }
-  for (const CaseKey& key : gone) rooms_.access->CaseGone(key);
+  for (const std::string& id : gone) rooms_.sessions->sync().OnDeleted(id);
   return absl::OkStatus();
 }
 

@@ -13,7 +13,6 @@
 #include "absl/status/statusor.h"
 
 #include "core/base/mutex.h"
-#include "server/access/access_changes.h"
 #include "server/exports/export_queue.h"
 #include "server/session/mesh_catalog.h"
 #include "server/session/session_registry.h"
@@ -27,7 +26,6 @@ namespace tissueform {
 // What this server knows of a store that it shares, and who is told when others change it.
 struct ClusterListeners {
   Stores* stores = nullptr;  // those of the database themselves
-  AccessChanges* access = nullptr;
   SessionRegistry* sessions = nullptr;
   MeshCatalog* meshes = nullptr;
   ExportQueue* exports = nullptr;
@@ -58,14 +56,10 @@ class ChangeFollower {
   void Loop();
   absl::Status Apply(const StoreChange& change);
   absl::Status LookAtSession(const std::string& id);
-  absl::Status LookAtPrediction(const std::string& id);
-  absl::Status LookAtCase(const CaseKey& key);
   absl::Status LookAtMesh(const std::string& sha256);
   absl::Status ResyncAll();
-  // What there is of each kind; what was known before and is not there goes.
+  // What was known before and is not there goes.
   absl::Status LookAtAllSessions(const std::vector<std::string>& known);
-  absl::Status LookAtAllPredictions(const std::vector<std::string>& known);
-  absl::Status LookAtAllCases(const std::vector<CaseKey>& known);
 
   ClusterListeners rooms_;  // constant once its thread runs
 

@@ -40,19 +40,14 @@ absl::StatusOr<std::unique_ptr<Cluster>> Cluster::Open(const ClusterOptions& opt
 
 Cluster::Cluster(const ClusterOptions& options, std::string name, PostgresStores* stores,
                  std::unique_ptr<PostgresPool> pool)
-    : pool_(std::move(pool)),
-      stores_(stores),
-      node_(pool_.get(), options, std::move(name)),
-      lookups_(pool_.get()) {}
+    : pool_(std::move(pool)), stores_(stores), node_(pool_.get(), options, std::move(name)) {}
 
-void Cluster::Join(ClusterListeners rooms, Access* access) {
+void Cluster::Join(ClusterListeners rooms) {
   rooms.stores = stores_;
   rooms_ = rooms;
-  rooms.access->EnableClusterMode();
-  access->set_row_reader(&lookups_);
   rooms.exports->set_read_gate(
       [this](const std::string& id, const std::function<absl::Status()>& read) {
-        return lookups_.ReadForExport(id, read);
+        return lookups_.Read(id, read);
       });
   rooms.sessions->loader().set_naming_room(
       [this](const absl::Status& refusal) { return node_.NamingRoom(refusal); });
@@ -98,7 +93,7 @@ void Cluster::AddTo(MetricsPage* page) {
   page->AddGauge("tissueform_node_name_taken", "1 while another server has this one's name.", {},
                  [this] { return node_.nodes().IsNameTaken() ? 1.0 : 0.0; });
   page->AddCounter("tissueform_row_lookups_total",
-                   "Database lookups of names that this node did not know.", {},
+                   "Database lookups of exports that this node did not know.", {},
                    [this] { return static_cast<double>(lookups_.lookups()); });
 }
 

@@ -11,11 +11,10 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#include "server/access/access.h"
 #include "server/cluster/change_follower.h"
 #include "server/cluster/cluster_node.h"
 #include "server/cluster/cluster_options.h"
-#include "server/cluster/read_through_loader.h"
+#include "server/cluster/export_lookups.h"
 #include "server/platform/metrics_page.h"
 #include "server/store/postgres_store/postgres_pool.h"
 #include "server/store/postgres_store/postgres_stores.h"
@@ -38,10 +37,10 @@ class Cluster {
 
   ClusterNode& node() { return node_; }
   const std::string& name() const { return node_.name(); }
-  const ReadThroughLoader& lookups() const { return lookups_; }
+  const ExportLookups& lookups() const { return lookups_; }
 
   // Whatever the rooms do not know they look for from now on. All must outlive Stop.
-  void Join(ClusterListeners rooms, Access* access);
+  void Join(ClusterListeners rooms);
   // `free_bytes` says how much memory sessions may still take here; any thread.
   void Start(std::function<int64_t()> free_bytes);
   // No room is told of anything any more; leases are renewed no longer.
@@ -62,7 +61,7 @@ class Cluster {
   PostgresStores* const stores_;
   ClusterNode node_;
   ClusterListeners rooms_;
-  ReadThroughLoader lookups_;
+  ExportLookups lookups_;
   std::unique_ptr<ChangeFollower> follower_;
 };
 

@@ -215,6 +215,20 @@ bool ExportQueue::IsExported(const std::string& prediction) const {
   return of_prediction_.contains(prediction);
 }
 
+std::set<std::string> ExportQueue::Exported() const {
+  std::set<std::string> predictions;
+  MutexLock lock(mutex_);
+  for (const auto& [prediction, ids] : of_prediction_) predictions.insert(prediction);
+  return predictions;
+}
+
+std::set<std::string> ExportQueue::ExportedCases() const {
+  std::set<std::string> cases;
+  MutexLock lock(mutex_);
+  for (const auto& [case_sha256, ids] : of_case_) cases.insert(case_sha256);
+  return cases;
+}
+
 std::set<std::string> ExportQueue::ExportedOfCase(const std::string& case_sha256) const {
   std::set<std::string> predictions;
   MutexLock lock(mutex_);

@@ -92,6 +92,9 @@ class ExportQueue {
 
   // Whether there is an export of the prediction, done or not.
   bool IsExported(const std::string& prediction) const;
+  // Predictions with an export, and the cases that they were planned in.
+  std::set<std::string> Exported() const;
+  std::set<std::string> ExportedCases() const;
   // Predictions with an export that were planned in the case.
   std::set<std::string> ExportedOfCase(const std::string& case_sha256) const;
 

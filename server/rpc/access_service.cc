@@ -113,28 +113,27 @@ grpc::ServerUnaryReactor* AccessService::WhoAmI(grpc::CallbackServerContext* con
 grpc::ServerUnaryReactor* AccessService::CreateShare(grpc::CallbackServerContext* context,
                                                      const v1::CreateShareRequest* request,
                                                      v1::Share* response) {
-  return HandleUnaryCall(context, "AccessService.CreateShare", gate_,
-                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+  return HandleStoreCall(context, "AccessService.CreateShare", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) -> absl::Status {
                            TF_ASSIGN_OR_RETURN(const ShareRow share, ToShare(request->share()));
                            *response = ToProto(share);
-                           scope.SetResource(share.resource);
-                           changes_->Share(scope.principal(), share, end);
-                           return absl::OkStatus();
+                           scope->SetResource(share.resource);
+                           return changes_->Share(scope->principal(), share);
                          });
 }
 
 grpc::ServerUnaryReactor* AccessService::ListShares(grpc::CallbackServerContext* context,
                                                     const v1::ListSharesRequest* request,
                                                     v1::ListSharesResponse* response) {
-  return HandleUnaryCall(context, "AccessService.ListShares", gate_,
-                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+  return HandleStoreCall(context, "AccessService.ListShares", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) -> absl::Status {
                            TF_ASSIGN_OR_RETURN(
                                const std::vector<ShareRow> shares,
-                               changes_->SharesOf(scope.principal(), request->resource()));
-                           scope.SetResource(request->resource());
-                           for (const ShareRow& share : shares)
+                               changes_->SharesOf(scope->principal(), request->resource()));
+                           scope->SetResource(request->resource());
+                           for (const ShareRow& share : shares) {
                              *response->add_shares() = ToProto(share);
-                           end(absl::OkStatus());
+                           }
                            return absl::OkStatus();
                          });
 }
@@ -142,89 +141,86 @@ grpc::ServerUnaryReactor* AccessService::ListShares(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* AccessService::DeleteShare(grpc::CallbackServerContext* context,
                                                      const v1::DeleteShareRequest* request,
                                                      google::protobuf::Empty* /*response*/) {
-  return HandleUnaryCall(context, "AccessService.DeleteShare", gate_,
-                         [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
-                           scope.SetResource(request->resource());
-                           changes_->Unshare(scope.principal(), request->resource(),
-                                             request->principal(), end);
-                           return absl::OkStatus();
-                         });
+  return HandleStoreCall(
+      context, "AccessService.DeleteShare", gate_, &registry_->pool(), [=, this](CallScope* scope) {
+        scope->SetResource(request->resource());
+        return changes_->Unshare(scope->principal(), request->resource(), request->principal());
+      });
 }
 
 grpc::ServerUnaryReactor* AccessService::CreateFollowLink(
     grpc::CallbackServerContext* context, const v1::CreateFollowLinkRequest* request,
     v1::FollowLink* response) {
-  return HandleUnaryCall(
-      context, "AccessService.CreateFollowLink", gate_,
-      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
-        const std::string token = NewLinkToken();
-        TF_ASSIGN_OR_RETURN(
-            const FollowLinkRow link,
-            ToLink(*request, token, changes_->options().max_link_lifetime, clock_()));
-        TF_RETURN_IF_ERROR(
-            AllowedSession(changes_->access(), &scope, request->session(), Permission::kWrite)
-                .status());
-        changes_->AddLink(scope.principal(), link, [=](const absl::Status& status) {
-          if (status.ok()) {
-            response->set_token(token);
-            response->mutable_expire_time()->set_seconds(link.expires_s);
-          }
-          end(status);
-        });
-        return absl::OkStatus();
-      });
+  return HandleStoreCall(
+      context, "AccessService.CreateFollowLink", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) { return MakeLink(scope, *request, response); });
+}
+
+absl::Status AccessService::MakeLink(CallScope* scope, const v1::CreateFollowLinkRequest& request,
+                                     v1::FollowLink* response) {
+  const std::string token = NewLinkToken();
+  TF_ASSIGN_OR_RETURN(const FollowLinkRow link,
+                      ToLink(request, token, changes_->options().max_link_lifetime, clock_()));
+  TF_RETURN_IF_ERROR(
+      AllowedSession(&changes_->access(), scope, request.session(), Permission::kWrite).status());
+  TF_RETURN_IF_ERROR(changes_->AddLink(scope->principal(), link));
+  response->set_token(token);
+  response->mutable_expire_time()->set_seconds(link.expires_s);
+  return absl::OkStatus();
 }
 
 grpc::ServerUnaryReactor* AccessService::DeleteFollowLinks(
     grpc::CallbackServerContext* context, const v1::DeleteFollowLinksRequest* request,
     google::protobuf::Empty* /*response*/) {
-  return HandleUnaryCall(
-      context, "AccessService.DeleteFollowLinks", gate_,
-      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
+  return HandleStoreCall(
+      context, "AccessService.DeleteFollowLinks", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) -> absl::Status {
         TF_ASSIGN_OR_RETURN(
             const std::string id,
-            AllowedSession(changes_->access(), &scope, request->session(), Permission::kWrite));
-        changes_->RemoveLinks(scope.principal(), id, end);
-        return absl::OkStatus();
+            AllowedSession(&changes_->access(), scope, request->session(), Permission::kWrite));
+        return changes_->RemoveLinks(scope->principal(), id);
       });
 }
 
 grpc::ServerUnaryReactor* AccessService::GetUsage(grpc::CallbackServerContext* context,
                                                   const v1::GetUsageRequest* request,
                                                   v1::Usage* response) {
-  return HandleUnaryCall(
-      context, "AccessService.GetUsage", gate_,
-      [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
-        TF_ASSIGN_OR_RETURN(const std::string asked,
-                            AskedPrincipal(scope.principal(), request->principal()));
-        std::map<std::string, v1::PrincipalUsage> usage = CollectUsage();
-        if (asked != kEverybody) {
-          v1::PrincipalUsage one = std::move(usage[asked]);
-          usage.clear();
-          usage[asked] = std::move(one);
-        }
-        for (auto& [name, of_name] : usage) {
-          of_name.set_principal(name);
-          *response->add_principals() = std::move(of_name);
-        }
-        std::stable_sort(response->mutable_principals()->begin(),
-                         response->mutable_principals()->end(),
-                         [](const v1::PrincipalUsage& a, const v1::PrincipalUsage& b) {
-                           return a.memory_bytes() > b.memory_bytes();
-                         });
-        end(absl::OkStatus());
-        return absl::OkStatus();
-      });
+  return HandleStoreCall(
+      context, "AccessService.GetUsage", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) { return ReportUsage(scope->principal(), *request, response); });
 }
 
-std::map<std::string, v1::PrincipalUsage> AccessService::CollectUsage() const {
+absl::Status AccessService::ReportUsage(const Principal& caller, const v1::GetUsageRequest& request,
+                                        v1::Usage* response) const {
+  TF_ASSIGN_OR_RETURN(const std::string asked, AskedPrincipal(caller, request.principal()));
+  using UsageOf = std::map<std::string, v1::PrincipalUsage>;
+  TF_ASSIGN_OR_RETURN(UsageOf usage, CollectUsage());
+  if (asked != kEverybody) {
+    v1::PrincipalUsage one = std::move(usage[asked]);
+    usage.clear();
+    usage[asked] = std::move(one);
+  }
+  for (auto& [name, of_name] : usage) {
+    of_name.set_principal(name);
+    *response->add_principals() = std::move(of_name);
+  }
+  std::stable_sort(response->mutable_principals()->begin(), response->mutable_principals()->end(),
+                   [](const v1::PrincipalUsage& a, const v1::PrincipalUsage& b) {
+                     return a.memory_bytes() > b.memory_bytes();
+                   });
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::map<std::string, v1::PrincipalUsage>> AccessService::CollectUsage() const {
   std::map<std::string, v1::PrincipalUsage> usage;
-  for (const auto& [owner, held] : changes_->access().HoldingsByOwner()) {
+  using HoldingsOfAll = std::map<std::string, Holdings>;
+  TF_ASSIGN_OR_RETURN(const HoldingsOfAll holdings, changes_->access().HoldingsByOwner());
+  for (const auto& [owner, held] : holdings) {
     usage[owner].set_stored_sessions(held.sessions);
     usage[owner].set_disk_bytes(held.bytes);
   }
   for (const std::shared_ptr<Session>& session : registry_->table().Loaded()) {
-    v1::PrincipalUsage& of_owner = usage[changes_->access().OwnerOf(session->id())];
+    v1::PrincipalUsage& of_owner = usage[registry_->table().OwnerOf(session->id())];
     of_owner.set_sessions(of_owner.sessions() + 1);
     of_owner.set_memory_bytes(of_owner.memory_bytes() + session->bytes_held());
   }

@@ -19,7 +19,7 @@ namespace tissueform {
 // tissueform.v1.AccessService. Stateless; all pointers must outlive it.
 class AccessService final : public v1::AccessService::CallbackService {
  public:
-  AccessService(AdmissionControl* gate, AccessChanges* changes, const SessionRegistry* registry,
+  AccessService(AdmissionControl* gate, AccessChanges* changes, SessionRegistry* registry,
                 const DeformStreams* streams, const SessionWatches* watches,
                 UnixClock clock = SystemUnixSeconds)
       : gate_(gate),
@@ -51,11 +51,16 @@ class AccessService final : public v1::AccessService::CallbackService {
                                      v1::Usage* response) override;
 
  private:
-  std::map<std::string, v1::PrincipalUsage> CollectUsage() const;
+  // All block on the store.
+  absl::Status MakeLink(CallScope* scope, const v1::CreateFollowLinkRequest& request,
+                        v1::FollowLink* response);
+  absl::Status ReportUsage(const Principal& caller, const v1::GetUsageRequest& request,
+                           v1::Usage* response) const;
+  absl::StatusOr<std::map<std::string, v1::PrincipalUsage>> CollectUsage() const;
 
   AdmissionControl* const gate_;
   AccessChanges* const changes_;
-  const SessionRegistry* const registry_;
+  SessionRegistry* const registry_;
   const DeformStreams* const streams_;
   const SessionWatches* const watches_;
   const UnixClock clock_;

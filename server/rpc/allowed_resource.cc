@@ -11,35 +11,37 @@
 
 namespace tissueform {
 
-absl::StatusOr<std::string> AllowedSession(const Access& access, CallScope* scope,
+absl::StatusOr<std::string> AllowedSession(Access* access, CallScope* scope,
                                            const std::string& name, Permission need) {
   TF_ASSIGN_OR_RETURN(std::string id, ParseSessionName(name));
-  TF_RETURN_IF_ERROR(access.CheckSessionAccess(scope->principal(), id, need));
+  TF_ASSIGN_OR_RETURN(const Access::Found found,
+                      access->CheckSessionAccess(scope->principal(), id, need));
   // What nobody has made is a text of the client's, and goes to no log.
-  if (access.KnowsSession(id)) scope->SetResource(name);
+  if (found == Access::Found::kYes) scope->SetResource(name);
   return id;
 }
 
-absl::StatusOr<std::string> AllowedPrediction(const Access& access, CallScope* scope,
+absl::StatusOr<std::string> AllowedPrediction(Access* access, CallScope* scope,
                                               const std::string& name, Permission need) {
   TF_ASSIGN_OR_RETURN(std::string id, ParsePredictionName(name));
-  TF_RETURN_IF_ERROR(access.CheckPredictionAccess(scope->principal(), id, need));
-  if (access.KnowsPrediction(id)) scope->SetResource(name);
+  TF_ASSIGN_OR_RETURN(const Access::Found found,
+                      access->CheckPredictionAccess(scope->principal(), id, need));
+  if (found == Access::Found::kYes) scope->SetResource(name);
   return id;
 }
 
-absl::StatusOr<std::string> AllowedMesh(const Access& access, CallScope* scope,
-                                        const std::string& name, Permission need) {
+absl::StatusOr<std::string> AllowedMesh(Access* access, CallScope* scope, const std::string& name,
+                                        Permission need) {
   TF_ASSIGN_OR_RETURN(std::string sha256, ParseMeshName(name));
-  TF_RETURN_IF_ERROR(access.CheckMeshAccess(scope->principal(), sha256, need));
+  TF_RETURN_IF_ERROR(access->CheckMeshAccess(scope->principal(), sha256, need));
   scope->SetResource(name);
   return sha256;
 }
 
-absl::StatusOr<CaseKey> AllowedCase(const Access& access, CallScope* scope, const std::string& name,
+absl::StatusOr<CaseKey> AllowedCase(Access* access, CallScope* scope, const std::string& name,
                                     Permission need) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseCaseName(name));
-  TF_ASSIGN_OR_RETURN(CaseKey key, access.CheckCaseAccess(scope->principal(), sha256, need));
+  TF_ASSIGN_OR_RETURN(CaseKey key, access->CheckCaseAccess(scope->principal(), sha256, need));
   scope->SetResource(name);
   return key;
 }

@@ -16,13 +16,13 @@
 namespace tissueform {
 
 // The id, or the SHA-256. Errors: InvalidArgument (no such name), those of Access.
-absl::StatusOr<std::string> AllowedSession(const Access& access, CallScope* scope,
+absl::StatusOr<std::string> AllowedSession(Access* access, CallScope* scope,
                                            const std::string& name, Permission need);
-absl::StatusOr<std::string> AllowedPrediction(const Access& access, CallScope* scope,
+absl::StatusOr<std::string> AllowedPrediction(Access* access, CallScope* scope,
                                               const std::string& name, Permission need);
-absl::StatusOr<std::string> AllowedMesh(const Access& access, CallScope* scope,
-                                        const std::string& name, Permission need);
-absl::StatusOr<CaseKey> AllowedCase(const Access& access, CallScope* scope, const std::string& name,
+absl::StatusOr<std::string> AllowedMesh(Access* access, CallScope* scope, const std::string& name,
+                                        Permission need);
+absl::StatusOr<CaseKey> AllowedCase(Access* access, CallScope* scope, const std::string& name,
                                     Permission need);
 
 }  // namespace tissueform

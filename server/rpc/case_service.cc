@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -29,7 +30,7 @@ struct CasePart {
 };
 
 // Blocks on the disk.
-absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, const Access& access,
+absl::StatusOr<CasePart> OpenPart(const v1::ReadCaseRequest& request, Access* access,
                                   CallScope* scope, CaseStore* store) {
   TF_ASSIGN_OR_RETURN(const CaseKey key,
                       AllowedCase(access, scope, request.name(), Permission::kRead));
@@ -87,8 +88,8 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
     call->End(call->scope().admission());
     return call;
   }
-  post([call, request, post, access = &access_, store = store_, most = limits_.max_chunk_bytes] {
-    absl::StatusOr<CasePart> part = OpenPart(*request, *access, &call->scope(), store);
+  post([call, request, post, access = access_, store = store_, most = limits_.max_chunk_bytes] {
+    absl::StatusOr<CasePart> part = OpenPart(*request, access, &call->scope(), store);
     if (!part.ok()) {
       call->End(part.status());
       return;
@@ -101,36 +102,26 @@ grpc::ServerWriteReactor<v1::ReadCaseResponse>* CaseService::ReadCase(
   return call;
 }
 
-grpc::ServerUnaryReactor* CaseService::Run(grpc::CallbackServerContext* context,
-                                           std::string_view method,
-                                           std::function<absl::Status(CallScope* scope)> work) {
-  return HandleUnaryCall(
-      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
-        pool_->Post(Lane::kStore,
-                    [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-        return absl::OkStatus();
-      });
-}
-
 grpc::ServerUnaryReactor* CaseService::GetCase(grpc::CallbackServerContext* context,
                                                const v1::GetCaseRequest* request,
                                                v1::Case* response) {
-  return Run(context, "CaseService.GetCase",
-             [=, this](CallScope* scope) { return Find(scope, *request, response); });
+  return HandleStoreCall(context, "CaseService.GetCase", gate_, pool_,
+                         [=, this](CallScope* scope) { return Find(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* CaseService::ListCases(grpc::CallbackServerContext* context,
                                                  const v1::ListCasesRequest* request,
                                                  v1::ListCasesResponse* response) {
-  return Run(context, "CaseService.ListCases",
-             [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
+  return HandleStoreCall(
+      context, "CaseService.ListCases", gate_, pool_,
+      [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
 }
 
 grpc::ServerUnaryReactor* CaseService::DeleteCase(grpc::CallbackServerContext* context,
                                                   const v1::DeleteCaseRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
-  return Run(context, "CaseService.DeleteCase",
-             [=, this](CallScope* scope) { return Remove(scope, *request); });
+  return HandleStoreCall(context, "CaseService.DeleteCase", gate_, pool_,
+                         [=, this](CallScope* scope) { return Remove(scope, *request); });
 }
 
 absl::Status CaseService::Find(CallScope* scope, const v1::GetCaseRequest& request,
@@ -146,11 +137,11 @@ absl::Status CaseService::List(const v1::ListCasesRequest& request, const Princi
                                v1::ListCasesResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  TF_ASSIGN_OR_RETURN(const CaseStore::Page found,
-                      store_->List({.owner = caller.name,
-                                    .also = access_.SharedCases(caller),
-                                    .after = page.after,
-                                    .limit = page.size}));
+  TF_ASSIGN_OR_RETURN(std::set<CaseKey> shared, access_->SharedCases(caller));
+  TF_ASSIGN_OR_RETURN(const CaseStore::Page found, store_->List({.owner = caller.name,
+                                                                 .also = std::move(shared),
+                                                                 .after = page.after,
+                                                                 .limit = page.size}));
   for (const CaseRecord& record : found.records) *response->add_cases() = ToProto(record);
   response->set_next_page_token(found.next);
   return absl::OkStatus();

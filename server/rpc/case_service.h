@@ -4,8 +4,6 @@
 #pragma once
 
 #include <atomic>
-#include <functional>
-#include <string_view>
 
 #include "absl/status/status.h"
 
@@ -22,9 +20,9 @@ namespace tissueform {
 // tissueform.v1.CaseService over a store. All pointers must outlive it.
 class CaseService final : public v1::CaseService::CallbackService {
  public:
-  CaseService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
-              CaseStore* store, WorkerPool* pool, DeadlineTimer* timer)
-      : gate_(gate), limits_(limits), access_(*access), store_(store), pool_(pool), timer_(timer) {}
+  CaseService(AdmissionControl* gate, const ServiceLimits& limits, Access* access, CaseStore* store,
+              WorkerPool* pool, DeadlineTimer* timer)
+      : gate_(gate), limits_(limits), access_(access), store_(store), pool_(pool), timer_(timer) {}
 
   grpc::ServerReadReactor<v1::UploadCaseRequest>* UploadCase(
       grpc::CallbackServerContext* context, v1::UploadCaseResponse* response) override;
@@ -40,10 +38,6 @@ class CaseService final : public v1::CaseService::CallbackService {
                                        google::protobuf::Empty* response) override;
 
  private:
-  // Finishes a call with what `work` says, which may block on the disk.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(CallScope* scope)> work);
-
   absl::Status Find(CallScope* scope, const v1::GetCaseRequest& request, v1::Case* response);
   absl::Status List(const v1::ListCasesRequest& request, const Principal& caller,
                     v1::ListCasesResponse* response);
@@ -52,7 +46,7 @@ class CaseService final : public v1::CaseService::CallbackService {
   // Constant.
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   CaseStore* const store_;
   WorkerPool* const pool_;
   DeadlineTimer* const timer_;

@@ -81,7 +81,7 @@ absl::StatusOr<CaseUploadStream::After> CaseUploadStream::TakeHeader(
     response_->set_already_existed(true);
     return After::kEnd;
   }
-  TF_RETURN_IF_ERROR(access_.CheckStorageQuota(scope().principal(), record.total_bytes));
+  TF_RETURN_IF_ERROR(access_->CheckStorageQuota(scope().principal(), record.total_bytes));
   TF_RETURN_IF_ERROR(TakePlace());
   TF_ASSIGN_OR_RETURN(writer_, store_->Begin(std::move(record), limits_.max_cases));
   return After::kMore;

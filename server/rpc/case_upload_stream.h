@@ -28,9 +28,9 @@ class CaseUploadStream final : public UploadStream<v1::UploadCaseRequest> {
  public:
   // `under_way`: how many cases are being received, by all calls together. It, `access`,
   // `store` and `response`, which belongs to gRPC, must outlive the call.
-  CaseUploadStream(CallScope scope, const ServiceLimits& limits, const Access& access,
-                   CaseStore* store, WorkerPool* pool, DeadlineTimer* timer,
-                   std::atomic<int>* under_way, v1::UploadCaseResponse* response)
+  CaseUploadStream(CallScope scope, const ServiceLimits& limits, Access* access, CaseStore* store,
+                   WorkerPool* pool, DeadlineTimer* timer, std::atomic<int>* under_way,
+                   v1::UploadCaseResponse* response)
       : UploadStream(std::move(scope), limits.upload_silence, Lane::kStore, pool, timer),
         limits_(limits),
         access_(access),
@@ -52,7 +52,7 @@ class CaseUploadStream final : public UploadStream<v1::UploadCaseRequest> {
 
   // Constant.
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   CaseStore* const store_;
   std::atomic<int>* const under_way_;
   v1::UploadCaseResponse* const response_;

@@ -55,11 +55,11 @@ std::string Encode(const Positions& positions, const VertexChoice& choice) {
 class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
  public:
   Comparison(CallScope scope, CancelCall cancel, DeadlineTimer* timer,
-             std::chrono::milliseconds patience, const Access* access, SessionRegistry* registry,
+             std::chrono::milliseconds patience, Access* access, SessionRegistry* registry,
              MeshCatalog* catalog, PredictionStore* store,
              const v1::ComparePredictionsRequest* request)
       : MessageStream(std::move(scope), std::move(cancel), timer, patience),
-        access_(*access),
+        access_(access),
         registry_(registry),
         catalog_(catalog),
         store_(store),
@@ -97,7 +97,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
     if (request_.has_other_model()) {
       TF_ASSIGN_OR_RETURN(const std::string session, ParseSessionName(one_.prediction.session()));
       TF_RETURN_IF_ERROR(
-          access_.CheckSessionAccess(scope().principal(), session, Permission::kRead));
+          access_->CheckSessionAccess(scope().principal(), session, Permission::kRead).status());
       AskModel();
       return absl::OkStatus();
     }
@@ -105,7 +105,8 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
       return absl::InvalidArgumentError("set other_prediction or other_model");
     }
     TF_ASSIGN_OR_RETURN(const std::string id, ParsePredictionName(request_.other_prediction()));
-    TF_RETURN_IF_ERROR(access_.CheckPredictionAccess(scope().principal(), id, Permission::kRead));
+    TF_RETURN_IF_ERROR(
+        access_->CheckPredictionAccess(scope().principal(), id, Permission::kRead).status());
     TF_ASSIGN_OR_RETURN(ReadPrediction other, Read(id, store_));
     if (other.prediction.mesh() != one_.prediction.mesh()) {
       return NotComparable(
@@ -199,7 +200,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
     return NextChunk(differences_, &offset_, message->mutable_differences());
   }
 
-  const Access& access_;
+  Access* const access_;
   SessionRegistry* const registry_;
   MeshCatalog* const catalog_;
   PredictionStore* const store_;
@@ -217,7 +218,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
 
 grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    std::chrono::milliseconds patience, const Access* access, SessionRegistry* registry,
+    std::chrono::milliseconds patience, Access* access, SessionRegistry* registry,
     MeshCatalog* catalog, PredictionStore* store, const v1::ComparePredictionsRequest* request) {
   auto* call = new Comparison(std::move(scope), CancelOf(context), timer, patience, access,
                               registry, catalog, store, request);

@@ -22,7 +22,7 @@ namespace tissueform {
 // `context` may be null (see CallScope); all other pointers must outlive the call.
 grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    std::chrono::milliseconds patience, const Access* access, SessionRegistry* registry,
+    std::chrono::milliseconds patience, Access* access, SessionRegistry* registry,
     MeshCatalog* catalog, PredictionStore* store, const v1::ComparePredictionsRequest* request);
 
 }  // namespace tissueform

@@ -27,11 +27,25 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
                  v1::DeformOnceResponse* response)
       : scope_(std::move(scope)), registry_(registry), request_(*request), response_(*response) {}
 
-  void Start(const Access& access) {
-    absl::Status status = scope_.admission();
-    if (status.ok()) {
-      status = AllowedSession(access, &scope_, request_.session(), Permission::kWrite).status();
+  void Start(Access* access) {
+    if (!scope_.admission().ok()) {
+      End(scope_.admission());
+      return;
     }
+    registry_->pool().Post(Lane::kLeases, [this, access] { Begin(access); });
+  }
+
+  void OnCancel() override {
+    *cancelled_ = true;
+    registry_->loader().CancelWait(cancelled_);
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  void Begin(Access* access) {
+    absl::Status status =
+        AllowedSession(access, &scope_, request_.session(), Permission::kWrite).status();
     if (status.ok()) status = CheckEncoding(request_.encoding());
     if (!status.ok()) {
       End(status);
@@ -46,14 +60,6 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
         });
   }
 
-  void OnCancel() override {
-    *cancelled_ = true;
-    registry_->loader().CancelWait(cancelled_);
-  }
-
-  void OnDone() override { delete this; }
-
- private:
   absl::Status ChooseVertices(const Session& session) {
     TF_ASSIGN_OR_RETURN(choice_,
                         ToVertexChoice(request_.vertices(), session.mesh().mesh.num_vertices(),

@@ -25,12 +25,12 @@ using DeformServiceBase = v1::DeformService::WithCallbackMethod_DeformOnce<
 // it.
 class DeformService final : public DeformServiceBase {
  public:
-  DeformService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  DeformService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
                 SessionRegistry* registry, DeformStreams* streams, SessionWatches* watches,
                 DeadlineTimer* timer)
       : gate_(gate),
         limits_(limits),
-        access_(*access),
+        access_(access),
         registry_(registry),
         streams_(streams),
         watches_(watches),
@@ -52,7 +52,7 @@ class DeformService final : public DeformServiceBase {
  private:
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
   SessionWatches* const watches_;

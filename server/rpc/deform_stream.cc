@@ -16,7 +16,7 @@
 namespace tissueform {
 
 DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& limits,
-                                         const Access& access, SessionRegistry* registry,
+                                         Access* access, SessionRegistry* registry,
                                          DeformStreams* streams, SessionWatches* watches,
                                          DeadlineTimer* timer)
     : scope_(std::move(scope)),
@@ -28,7 +28,7 @@ DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& l
       watches_(watches),
       timer_(timer),
       authorization_(
-          timer, kReauthorizePeriod, [this] { return CheckAuthorization(); },
+          timer, &registry->pool(), kReauthorizePeriod, [this] { return AuthorizationQuestion(); },
           [this](const absl::Status& status) { EndUnauthorized(status); }),
       followers_(timer, [this](int count) { TellFollowers(count); }),
       commits_(
@@ -101,13 +101,17 @@ void DeformStreamReactor::StopWaiting() {
   registry_->loader().CancelWait(cancelled_);
 }
 
-absl::Status DeformStreamReactor::CheckAuthorization() {
+StreamAuthorization::Question DeformStreamReactor::AuthorizationQuestion() {
   MutexLock lock(mutex_);
-  if (finished_) return absl::OkStatus();
-  TF_RETURN_IF_ERROR(scope_.IsStillAuthorized());
-  if (!flow_.has_value()) return absl::OkStatus();  // checked when it names its session
-  return access_.RecheckSessionAccess(scope_.principal(), opening_.request().session_id,
-                                      Permission::kWrite);
+  if (finished_) return {};
+  // Until it names its session nothing else is checked.
+  const std::string session = flow_.has_value() ? opening_.request().session_id : "";
+  return [still_good = scope_.AuthorizationQuestion(), access = access_,
+          caller = scope_.principal(), session]() -> absl::Status {
+    TF_RETURN_IF_ERROR(still_good());
+    if (session.empty()) return absl::OkStatus();
+    return access->RecheckSessionAccess(caller, session, Permission::kWrite);
+  };
 }
 
 void DeformStreamReactor::EndUnauthorized(const absl::Status& status) {
@@ -203,23 +207,37 @@ absl::Status DeformStreamReactor::TakeConfiguration() {
   if (!request_.has_configuration()) {
     return absl::InvalidArgumentError("the first message must be the configuration");
   }
-  TF_RETURN_IF_ERROR(
-      AllowedSession(access_, &scope_, request_.configuration().session(), Permission::kWrite)
-          .status());
   TF_RETURN_IF_ERROR(opening_.TakeRequest(request_.configuration(), limits_));
   flow_.emplace(opening_.request().max_unacked, &streams_->measures());
-  StartOpening();
+  flow_->StartPreparation();
+  registry_->pool().Post(Lane::kLeases,
+                         [this, caller = scope_.principal(), id = opening_.request().session_id] {
+                           const absl::StatusOr<Access::Found> found =
+                               access_->CheckSessionAccess(caller, id, Permission::kWrite);
+                           if (!found.ok()) {
+                             TakeSession(found.status());
+                             return;
+                           }
+                           if (*found == Access::Found::kYes) {
+                             MutexLock lock(mutex_);
+                             scope_.SetResource(SessionName(id));
+                           }
+                           OpenSession(id);
+                         });
   return absl::OkStatus();
+}
+
+void DeformStreamReactor::OpenSession(const std::string& id) {
+  registry_->loader().Open(id, cancelled_,
+                           [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+                             TakeSession(std::move(session));
+                           });
 }
 
 void DeformStreamReactor::StartOpening() {
   flow_->StartPreparation();
-  registry_->pool().Post(Lane::kFrames, [this, id = opening_.request().session_id] {
-    registry_->loader().Open(id, cancelled_,
-                             [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-                               TakeSession(std::move(session));
-                             });
-  });
+  registry_->pool().Post(Lane::kFrames,
+                         [this, id = opening_.request().session_id] { OpenSession(id); });
 }
 
 void DeformStreamReactor::TakeSession(absl::StatusOr<std::shared_ptr<Session>> session) {

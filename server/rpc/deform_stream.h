@@ -53,7 +53,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
                             private DragHost {
  public:
   // All pointers must outlive the stream.
-  DeformStreamReactor(CallScope scope, const ServiceLimits& limits, const Access& access,
+  DeformStreamReactor(CallScope scope, const ServiceLimits& limits, Access* access,
                       SessionRegistry* registry, DeformStreams* streams, SessionWatches* watches,
                       DeadlineTimer* timer);
 
@@ -73,7 +73,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   // The client has had its time for the configuration.
   void EndUnlessConfigured() ABSL_LOCKS_EXCLUDED(mutex_);
   // What its authorization asks, and what follows.
-  absl::Status CheckAuthorization() ABSL_LOCKS_EXCLUDED(mutex_);
+  StreamAuthorization::Question AuthorizationQuestion() ABSL_LOCKS_EXCLUDED(mutex_);
   void EndUnauthorized(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mutex_);
   // It may wait for the session to be made. Not under the mutex: the registry answers at once.
   void StopWaiting() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -95,6 +95,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void Notify(std::optional<v1::DeformNotice> notice) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   // Asks for the session, at first and whenever it has left memory.
+  void OpenSession(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
   void StartOpening() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void TakeSession(absl::StatusOr<std::shared_ptr<Session>> session) ABSL_LOCKS_EXCLUDED(mutex_);
   absl::Status Configure(std::shared_ptr<Session> session) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -123,7 +124,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   // Constant.
   const std::string principal_;
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   SessionRegistry* const registry_;
   DeformStreams* const streams_;
   SessionWatches* const watches_;

@@ -46,40 +46,31 @@ absl::StatusOr<ExportState> ToState(v1::ExportState state) {
 
 }  // namespace
 
-grpc::ServerUnaryReactor* ExportService::Run(grpc::CallbackServerContext* context,
-                                             std::string_view method,
-                                             std::function<absl::Status(CallScope* scope)> work) {
-  return HandleUnaryCall(
-      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
-        pool_->Post(Lane::kStore,
-                    [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-        return absl::OkStatus();
-      });
-}
-
 grpc::ServerUnaryReactor* ExportService::CreateExport(grpc::CallbackServerContext* context,
                                                       const v1::CreateExportRequest* request,
                                                       v1::Export* response) {
-  return Run(context, "ExportService.CreateExport",
-             [=, this](CallScope* scope) { return Create(scope, *request, response); });
+  return HandleStoreCall(context, "ExportService.CreateExport", gate_, pool_,
+                         [=, this](CallScope* scope) { return Create(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* ExportService::GetExport(grpc::CallbackServerContext* context,
                                                    const v1::GetExportRequest* request,
                                                    v1::Export* response) {
-  return Run(context, "ExportService.GetExport", [=, this](CallScope* scope) -> absl::Status {
-    TF_ASSIGN_OR_RETURN(const ExportRecord record,
-                        Allowed(scope, request->name(), Permission::kRead));
-    *response = ToProto(record);
-    return absl::OkStatus();
-  });
+  return HandleStoreCall(context, "ExportService.GetExport", gate_, pool_,
+                         [=, this](CallScope* scope) -> absl::Status {
+                           TF_ASSIGN_OR_RETURN(const ExportRecord record,
+                                               Allowed(scope, request->name(), Permission::kRead));
+                           *response = ToProto(record);
+                           return absl::OkStatus();
+                         });
 }
 
 grpc::ServerUnaryReactor* ExportService::ListExports(grpc::CallbackServerContext* context,
                                                      const v1::ListExportsRequest* request,
                                                      v1::ListExportsResponse* response) {
-  return Run(context, "ExportService.ListExports",
-             [=, this](CallScope* scope) { return List(scope->principal(), *request, response); });
+  return HandleStoreCall(
+      context, "ExportService.ListExports", gate_, pool_,
+      [=, this](CallScope* scope) { return List(scope->principal(), *request, response); });
 }
 
 grpc::ServerWriteReactor<v1::WatchExportsResponse>* ExportService::WatchExports(
@@ -91,18 +82,19 @@ grpc::ServerWriteReactor<v1::WatchExportsResponse>* ExportService::WatchExports(
 grpc::ServerUnaryReactor* ExportService::UpdateExport(grpc::CallbackServerContext* context,
                                                       const v1::UpdateExportRequest* request,
                                                       v1::Export* response) {
-  return Run(context, "ExportService.UpdateExport",
-             [=, this](CallScope* scope) { return Update(scope, *request, response); });
+  return HandleStoreCall(context, "ExportService.UpdateExport", gate_, pool_,
+                         [=, this](CallScope* scope) { return Update(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* ExportService::DeleteExport(grpc::CallbackServerContext* context,
                                                       const v1::DeleteExportRequest* request,
                                                       google::protobuf::Empty* /*response*/) {
-  return Run(context, "ExportService.DeleteExport", [=, this](CallScope* scope) -> absl::Status {
-    TF_ASSIGN_OR_RETURN(const ExportRecord record,
-                        Allowed(scope, request->name(), Permission::kOwner));
-    return book_->Remove(record.id);
-  });
+  return HandleStoreCall(context, "ExportService.DeleteExport", gate_, pool_,
+                         [=, this](CallScope* scope) -> absl::Status {
+                           TF_ASSIGN_OR_RETURN(const ExportRecord record,
+                                               Allowed(scope, request->name(), Permission::kOwner));
+                           return book_->Remove(record.id);
+                         });
 }
 
 absl::StatusOr<ExportRecord> ExportService::Allowed(CallScope* scope, const std::string& name,
@@ -124,7 +116,7 @@ absl::StatusOr<ExportRecord> ExportService::Wanted(CallScope* scope,
   }
   TF_RETURN_IF_ERROR(CheckMeasures(request.measures()));
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.prediction(), Permission::kOwner));
+                      AllowedPrediction(access_, scope, request.prediction(), Permission::kOwner));
   TF_ASSIGN_OR_RETURN(const PredictionRecord prediction, predictions_->Get(id));
   if (prediction.case_sha256.empty()) {
     return absl::FailedPreconditionError(
@@ -144,7 +136,7 @@ absl::Status ExportService::Create(CallScope* scope, const v1::CreateExportReque
   TF_ASSIGN_OR_RETURN(ExportRecord wanted, Wanted(scope, request));
   TF_ASSIGN_OR_RETURN(const ExportRecord made, book_->Create(std::move(wanted)));
   // It may have gone between the two, and found no export that goes with it.
-  if (!access_->KnowsPrediction(made.prediction)) {
+  if (absl::IsNotFound(predictions_->Get(made.prediction).status())) {
     TF_RETURN_IF_ERROR(book_->RemoveOf(made.prediction));
     return NoPrediction(made.prediction);
   }

@@ -3,9 +3,6 @@
 
 #pragma once
 
-#include <functional>
-#include <string_view>
-
 #include "absl/status/status.h"
 
 #include "server/access/access.h"
@@ -23,7 +20,7 @@ namespace tissueform {
 // tissueform.v1.ExportService over a book. Stateless; all pointers must outlive it.
 class ExportService final : public v1::ExportService::CallbackService {
  public:
-  ExportService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  ExportService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
                 PredictionStore* predictions, ExportQueue* book, ExportWatches* watches,
                 WorkerPool* pool, DeadlineTimer* timer)
       : gate_(gate),
@@ -54,10 +51,6 @@ class ExportService final : public v1::ExportService::CallbackService {
                                          google::protobuf::Empty* response) override;
 
  private:
-  // Finishes a call with what `work` says, which may block on the disk.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(CallScope* scope)> work);
-
   // The export, once its caller may have it.
   absl::StatusOr<ExportRecord> Allowed(CallScope* scope, const std::string& name,
                                        Permission need) const;
@@ -72,7 +65,7 @@ class ExportService final : public v1::ExportService::CallbackService {
 
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access* const access_;
+  Access* const access_;
   PredictionStore* const predictions_;
   ExportQueue* const book_;
   ExportWatches* const watches_;

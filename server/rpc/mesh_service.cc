@@ -5,6 +5,8 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,8 +33,10 @@ struct SurfaceToSend {
 
 // Blocks on the disk, and computes.
 absl::StatusOr<std::shared_ptr<SurfaceToSend>> MakeSurface(const v1::GetSurfaceRequest& request,
-                                                           const std::string& sha256,
+                                                           Access* access, CallScope* scope,
                                                            MeshCatalog* catalog) {
+  TF_ASSIGN_OR_RETURN(const std::string sha256,
+                      AllowedMesh(access, scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<const StoredMesh> mesh, catalog->Load(sha256));
   TF_ASSIGN_OR_RETURN(const std::vector<const CellArray*> arrays,
                       FindSurfaceArrays(*mesh, request.cell_arrays()));
@@ -62,28 +66,20 @@ grpc::ServerReadReactor<v1::UploadMeshRequest>* MeshService::UploadMesh(
   return call;
 }
 
-grpc::ServerUnaryReactor* MeshService::Run(grpc::CallbackServerContext* context,
-                                           std::string_view method,
-                                           std::function<absl::Status(CallScope* scope)> work) {
-  return HandleUnaryCall(context, method, gate_, [&](CallScope& scope, const FinishCall& end) {
-    pool_->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-    return absl::OkStatus();
-  });
-}
-
 grpc::ServerUnaryReactor* MeshService::QueryUpload(grpc::CallbackServerContext* context,
                                                    const v1::QueryUploadRequest* request,
                                                    v1::QueryUploadResponse* response) {
-  return Run(context, "MeshService.QueryUpload", [=, this](CallScope* scope) {
-    return FindUpload(scope->principal(), *request, response);
-  });
+  return HandleStoreCall(
+      context, "MeshService.QueryUpload", gate_, pool_,
+      [=, this](CallScope* scope) { return FindUpload(scope->principal(), *request, response); });
 }
 
 grpc::ServerUnaryReactor* MeshService::GetMesh(grpc::CallbackServerContext* context,
                                                const v1::GetMeshRequest* request,
                                                v1::Mesh* response) {
-  return Run(context, "MeshService.GetMesh",
-             [=, this](CallScope* scope) { return FindMesh(scope, *request, response); });
+  return HandleStoreCall(context, "MeshService.GetMesh", gate_, pool_, [=, this](CallScope* scope) {
+    return FindMesh(scope, *request, response);
+  });
 }
 
 grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
@@ -95,14 +91,9 @@ grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
     call->End(call->scope().admission());
     return call;
   }
-  const absl::StatusOr<std::string> sha256 =
-      AllowedMesh(changes_->access(), &call->scope(), request->name(), Permission::kRead);
-  if (!sha256.ok()) {
-    call->End(sha256.status());
-    return call;
-  }
-  pool_->Post(Lane::kStore, [call, request, sha256 = *sha256, catalog = catalog_] {
-    absl::StatusOr<std::shared_ptr<SurfaceToSend>> made = MakeSurface(*request, sha256, catalog);
+  pool_->Post(Lane::kStore, [call, request, access = &changes_->access(), catalog = catalog_] {
+    absl::StatusOr<std::shared_ptr<SurfaceToSend>> made =
+        MakeSurface(*request, access, &call->scope(), catalog);
     if (!made.ok()) {
       call->End(made.status());
       return;
@@ -117,15 +108,16 @@ grpc::ServerWriteReactor<v1::GetSurfaceResponse>* MeshService::GetSurface(
 grpc::ServerUnaryReactor* MeshService::ListMeshes(grpc::CallbackServerContext* context,
                                                   const v1::ListMeshesRequest* request,
                                                   v1::ListMeshesResponse* response) {
-  return Run(context, "MeshService.ListMeshes",
-             [=, this](CallScope* scope) { return List(scope->principal(), *request, response); });
+  return HandleStoreCall(
+      context, "MeshService.ListMeshes", gate_, pool_,
+      [=, this](CallScope* scope) { return List(scope->principal(), *request, response); });
 }
 
 grpc::ServerUnaryReactor* MeshService::DeleteMesh(grpc::CallbackServerContext* context,
                                                   const v1::DeleteMeshRequest* request,
                                                   google::protobuf::Empty* /*response*/) {
-  return Run(context, "MeshService.DeleteMesh",
-             [=, this](CallScope* scope) { return RemoveMesh(scope, *request); });
+  return HandleStoreCall(context, "MeshService.DeleteMesh", gate_, pool_,
+                         [=, this](CallScope* scope) { return RemoveMesh(scope, *request); });
 }
 
 absl::Status MeshService::FindUpload(const Principal& caller, const v1::QueryUploadRequest& request,
@@ -140,7 +132,7 @@ absl::Status MeshService::FindUpload(const Principal& caller, const v1::QueryUpl
 absl::Status MeshService::FindMesh(CallScope* scope, const v1::GetMeshRequest& request,
                                    v1::Mesh* response) {
   TF_ASSIGN_OR_RETURN(const std::string sha256,
-                      AllowedMesh(changes_->access(), scope, request.name(), Permission::kRead));
+                      AllowedMesh(&changes_->access(), scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const MeshView mesh, catalog_->Look(sha256));
   *response = ToProto(mesh);
   return absl::OkStatus();
@@ -150,13 +142,16 @@ absl::Status MeshService::List(const Principal& caller, const v1::ListMeshesRequ
                                v1::ListMeshesResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
+  using Names = std::optional<std::set<std::string>>;
+  TF_ASSIGN_OR_RETURN(const Names near, changes_->access().MeshesNear(caller));
   std::string last;
   std::string after = page.after;
   do {
     TF_ASSIGN_OR_RETURN(const MeshViewPage views, catalog_->List(after, page.size));
     for (const MeshView& view : views.views) {
-      if (!changes_->access().CheckMeshAccess(caller, view.record.sha256, Permission::kRead).ok())
-        continue;
+      const std::string& sha256 = view.record.sha256;
+      if (near.has_value() && !near->contains(sha256)) continue;
+      if (!changes_->access().CheckMeshAccess(caller, sha256, Permission::kRead).ok()) continue;
       if (response->meshes_size() == page.size) {
         response->set_next_page_token(last);
         return absl::OkStatus();
@@ -171,16 +166,21 @@ absl::Status MeshService::List(const Principal& caller, const v1::ListMeshesRequ
 
 // Others who have sent the same bytes keep the mesh, and nobody hears of them.
 absl::Status MeshService::RemoveMesh(CallScope* scope, const v1::DeleteMeshRequest& request) {
-  const Access& access = changes_->access();
+  Access& access = changes_->access();
   TF_ASSIGN_OR_RETURN(const std::string sha256,
-                      AllowedMesh(access, scope, request.name(), Permission::kRead));
+                      AllowedMesh(&access, scope, request.name(), Permission::kRead));
   const Principal& caller = scope->principal();
   // A prediction may hold the name of one that has gone.
   TF_RETURN_IF_ERROR(catalog_->Look(sha256).status());
   TF_RETURN_IF_ERROR(access.CheckMeshAccess(caller, sha256, Permission::kOwner));
-  if (!access.OthersHoldMesh(caller, sha256)) return registry_->table().RemoveMesh(sha256);
-  const int sessions = access.CountSessionsOf(caller, sha256);
-  return sessions > 0 ? MeshInUse(sessions) : changes_->ReleaseMesh(caller, sha256);
+  TF_ASSIGN_OR_RETURN(const MeshUse use, access.FindMeshUse(sha256));
+  const auto own_sessions = use.sessions.find(caller.name);
+  const bool has_sessions = own_sessions != use.sessions.end();
+  const bool others_hold = use.senders.size() > (use.senders.contains(caller.name) ? 1U : 0U) ||
+                           use.sessions.size() > (has_sessions ? 1U : 0U);
+  if (!others_hold) return registry_->table().RemoveMesh(sha256);
+  if (has_sessions) return MeshInUse(static_cast<int>(own_sessions->second));
+  return changes_->ReleaseMesh(caller, sha256);
 }
 
 }  // namespace tissueform

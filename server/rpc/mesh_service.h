@@ -3,9 +3,6 @@
 
 #pragma once
 
-#include <functional>
-#include <string_view>
-
 #include "server/access/access_changes.h"
 #include "server/rpc/calls/call_scope.h"
 #include "server/session/deadline_timer.h"
@@ -50,10 +47,6 @@ class MeshService final : public v1::MeshService::CallbackService {
                                        google::protobuf::Empty* response) override;
 
  private:
-  // Finishes a call with what `work` says, which may block on the disk.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(CallScope* scope)> work);
-
   absl::Status FindUpload(const Principal& caller, const v1::QueryUploadRequest& request,
                           v1::QueryUploadResponse* response);
   absl::Status FindMesh(CallScope* scope, const v1::GetMeshRequest& request, v1::Mesh* response);

@@ -61,24 +61,13 @@ class FitCall : public grpc::ServerUnaryReactor {
           v1::FitResponse* response)
       : scope_(std::move(scope)), registry_(registry), request_(*request), response_(*response) {}
 
-  void Start(const Access& access) {
-    EndUnlessOk([this, &access]() -> absl::Status {
-      TF_RETURN_IF_ERROR(scope_.admission());
-      TF_ASSIGN_OR_RETURN(const std::string id,
-                          AllowedSession(access, &scope_, request_.session(), Permission::kWrite));
-      TF_ASSIGN_OR_RETURN(wanted_, ToFitRequest(request_));
-      registry_->loader().Open(
-          id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-            if (!session.ok()) {
-              End(session.status());
-              return;
-            }
-            session_ = *std::move(session);
-            session_->pool().Post(Lane::kSolves,
-                                  [this] { EndUnlessOk([this] { return Resolve(); }); });
-          });
-      return absl::OkStatus();
-    });
+  void Start(Access* access) {
+    if (!scope_.admission().ok()) {
+      End(scope_.admission());
+      return;
+    }
+    registry_->pool().Post(Lane::kLeases,
+                           [this, access] { EndUnlessOk([&] { return Begin(access); }); });
   }
 
   void OnCancel() override {
@@ -93,6 +82,23 @@ class FitCall : public grpc::ServerUnaryReactor {
   template <typename Step>
   void EndUnlessOk(const Step& step) {
     if (const absl::Status status = step(); !status.ok()) End(status);
+  }
+
+  absl::Status Begin(Access* access) {
+    TF_ASSIGN_OR_RETURN(const std::string id,
+                        AllowedSession(access, &scope_, request_.session(), Permission::kWrite));
+    TF_ASSIGN_OR_RETURN(wanted_, ToFitRequest(request_));
+    registry_->loader().Open(
+        id, cancelled_, [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+          if (!session.ok()) {
+            End(session.status());
+            return;
+          }
+          session_ = *std::move(session);
+          session_->pool().Post(Lane::kSolves,
+                                [this] { EndUnlessOk([this] { return Resolve(); }); });
+        });
+    return absl::OkStatus();
   }
 
   absl::Status Resolve() {

@@ -13,15 +13,15 @@ namespace tissueform {
 // tissueform.v1.PlanService over the registry. Stateless; all pointers must outlive it.
 class PlanService final : public v1::PlanService::CallbackService {
  public:
-  PlanService(AdmissionControl* gate, const Access* access, SessionRegistry* registry)
-      : gate_(gate), access_(*access), registry_(registry) {}
+  PlanService(AdmissionControl* gate, Access* access, SessionRegistry* registry)
+      : gate_(gate), access_(access), registry_(registry) {}
 
   grpc::ServerUnaryReactor* Fit(grpc::CallbackServerContext* context, const v1::FitRequest* request,
                                 v1::FitResponse* response) override;
 
  private:
   AdmissionControl* const gate_;
-  const Access& access_;
+  Access* const access_;
   SessionRegistry* const registry_;
 };
 

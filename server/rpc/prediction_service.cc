@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -33,11 +34,11 @@ constexpr size_t kPageBytes = size_t{2} << 20;
 // One CreatePrediction call. Deletes itself when gRPC is done with it.
 class CreatePredictionCall : public grpc::ServerUnaryReactor {
  public:
-  CreatePredictionCall(CallScope scope, const Access* access, SessionRegistry* registry,
+  CreatePredictionCall(CallScope scope, Access* access, SessionRegistry* registry,
                        PredictionStore* store, const v1::CreatePredictionRequest* request,
                        v1::Prediction* response)
       : scope_(std::move(scope)),
-        access_(*access),
+        access_(access),
         registry_(registry),
         store_(store),
         request_(*request),
@@ -48,17 +49,8 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
     const absl::Status status = scope_.admission().ok() ? Check(limits) : scope_.admission();
     if (!status.ok()) {
       End(status);
-    } else if (request_.request_id().empty()) {
-      Solve();
     } else {
-      PostToStore([this] {
-        const absl::Status earlier = TakeEarlier();
-        if (absl::IsNotFound(earlier)) {
-          Solve();
-        } else {
-          End(earlier);
-        }
-      });
+      PostToStore([this] { Begin(); });
     }
   }
 
@@ -70,6 +62,17 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   void OnDone() override { delete this; }
 
  private:
+  // Blocks on the store.
+  void Begin() {
+    const absl::Status earlier =
+        request_.request_id().empty() ? absl::NotFoundError("") : TakeEarlier();
+    if (absl::IsNotFound(earlier)) {
+      Solve();
+    } else {
+      End(earlier);
+    }
+  }
+
   absl::Status Check(const ServiceLimits& limits) {
     const size_t bytes = request_.request_id().size();
     if (bytes > static_cast<size_t>(limits.max_request_id_bytes)) {
@@ -99,7 +102,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
     absl::Status allowed =
         AllowedSession(access_, &scope_, request_.session(), Permission::kWrite).status();
     if (allowed.ok())
-      allowed = access_.CheckStorageQuota(scope_.principal(), 1);  // before the work
+      allowed = access_->CheckStorageQuota(scope_.principal(), 1);  // before the work
     if (!allowed.ok()) {
       End(allowed);
       return;
@@ -117,8 +120,8 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   }
 
   absl::Status Keep() {
-    TF_RETURN_IF_ERROR(access_.CheckStorageQuota(scope_.principal(),
-                                                 static_cast<int64_t>(keep_.positions.size())));
+    TF_RETURN_IF_ERROR(access_->CheckStorageQuota(scope_.principal(),
+                                                  static_cast<int64_t>(keep_.positions.size())));
     const absl::Status kept = store_->Create(keep_.record, keep_.positions);
     // The same request twice at once: the other one was first.
     if (absl::IsAlreadyExists(kept) && !key_.fingerprint.empty()) return TakeEarlier();
@@ -131,7 +134,7 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
   void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
 
   CallScope scope_;
-  const Access& access_;
+  Access* const access_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;
   const v1::CreatePredictionRequest& request_;
@@ -143,8 +146,10 @@ class CreatePredictionCall : public grpc::ServerUnaryReactor {
 };
 
 // The positions from the request's offset on. Blocks on the disk.
-absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request, const std::string& id,
-                                     PredictionStore* store) {
+absl::StatusOr<std::string> ReadFrom(const v1::ReadPositionsRequest& request, Access* access,
+                                     CallScope* scope, PredictionStore* store) {
+  TF_ASSIGN_OR_RETURN(const std::string id,
+                      AllowedPrediction(access, scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(std::string positions, store->Positions(id));
   const auto size = static_cast<int64_t>(positions.size());
   if (request.read_offset() < 0 || request.read_offset() > size) {
@@ -176,14 +181,8 @@ grpc::ServerWriteReactor<v1::ReadPositionsResponse>* PredictionService::ReadPosi
     call->End(call->scope().admission());
     return call;
   }
-  absl::StatusOr<std::string> id =
-      AllowedPrediction(*access_, &call->scope(), request->name(), Permission::kRead);
-  if (!id.ok()) {
-    call->End(id.status());
-    return call;
-  }
-  registry_->pool().Post(Lane::kStore, [call, request, id = *std::move(id), store = store_] {
-    absl::StatusOr<std::string> positions = ReadFrom(*request, id, store);
+  registry_->pool().Post(Lane::kStore, [call, request, access = access_, store = store_] {
+    absl::StatusOr<std::string> positions = ReadFrom(*request, access, &call->scope(), store);
     if (!positions.ok()) {
       call->End(positions.status());
       return;
@@ -204,42 +203,32 @@ grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* PredictionService::Com
       context, timer_, limits_.upload_silence, access_, registry_, catalog_, store_, request);
 }
 
-grpc::ServerUnaryReactor* PredictionService::Run(
-    grpc::CallbackServerContext* context, std::string_view method,
-    std::function<absl::Status(CallScope* scope)> work) {
-  return HandleUnaryCall(
-      context, method, gate_, [&, this](CallScope& scope, const FinishCall& end) {
-        registry_->pool().Post(Lane::kStore,
-                               [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
-        return absl::OkStatus();
-      });
-}
-
 grpc::ServerUnaryReactor* PredictionService::GetPrediction(grpc::CallbackServerContext* context,
                                                            const v1::GetPredictionRequest* request,
                                                            v1::Prediction* response) {
-  return Run(context, "PredictionService.GetPrediction",
-             [=, this](CallScope* scope) { return Find(scope, *request, response); });
+  return HandleStoreCall(context, "PredictionService.GetPrediction", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) { return Find(scope, *request, response); });
 }
 
 grpc::ServerUnaryReactor* PredictionService::ListPredictions(
     grpc::CallbackServerContext* context, const v1::ListPredictionsRequest* request,
     v1::ListPredictionsResponse* response) {
-  return Run(context, "PredictionService.ListPredictions",
-             [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
+  return HandleStoreCall(
+      context, "PredictionService.ListPredictions", gate_, &registry_->pool(),
+      [=, this](CallScope* scope) { return List(*request, scope->principal(), response); });
 }
 
 grpc::ServerUnaryReactor* PredictionService::DeletePrediction(
     grpc::CallbackServerContext* context, const v1::DeletePredictionRequest* request,
     google::protobuf::Empty* /*response*/) {
-  return Run(context, "PredictionService.DeletePrediction",
-             [=, this](CallScope* scope) { return Remove(scope, *request); });
+  return HandleStoreCall(context, "PredictionService.DeletePrediction", gate_, &registry_->pool(),
+                         [=, this](CallScope* scope) { return Remove(scope, *request); });
 }
 
 absl::Status PredictionService::Find(CallScope* scope, const v1::GetPredictionRequest& request,
                                      v1::Prediction* response) {
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.name(), Permission::kRead));
+                      AllowedPrediction(access_, scope, request.name(), Permission::kRead));
   TF_ASSIGN_OR_RETURN(const PredictionRecord record, store_->Get(id));
   TF_ASSIGN_OR_RETURN(KeptPrediction kept, FromRecord(record));
   *response = std::move(kept.prediction);
@@ -251,10 +240,9 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
                                      v1::ListPredictionsResponse* response) {
   TF_ASSIGN_OR_RETURN(const PageRequest page,
                       ReadPageRequest(request.page_size(), request.page_token()));
-  PredictionStore::ListRequest wanted{.owner = caller.name,
-                                      .also = access_->SharedPredictions(caller),
-                                      .after = page.after,
-                                      .limit = page.size};
+  TF_ASSIGN_OR_RETURN(std::set<std::string> shared, access_->SharedPredictions(caller));
+  PredictionStore::ListRequest wanted{
+      .owner = caller.name, .also = std::move(shared), .after = page.after, .limit = page.size};
   if (!request.session().empty()) {
     TF_ASSIGN_OR_RETURN(wanted.session, ParseSessionName(request.session()));
   }
@@ -282,7 +270,7 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
 absl::Status PredictionService::Remove(CallScope* scope,
                                        const v1::DeletePredictionRequest& request) {
   TF_ASSIGN_OR_RETURN(const std::string id,
-                      AllowedPrediction(*access_, scope, request.name(), Permission::kOwner));
+                      AllowedPrediction(access_, scope, request.name(), Permission::kOwner));
   TF_RETURN_IF_ERROR(store_->Delete(id));
   // In memory its exports are gone; after a restart there is no prediction of those on the disk.
   if (!exports_->RemoveOf(id).ok()) spdlog::warn("exports of a removed prediction remain on disk");

@@ -3,9 +3,6 @@
 
 #pragma once
 
-#include <functional>
-#include <string_view>
-
 #include "absl/status/status.h"
 
 #include "server/access/access.h"
@@ -23,7 +20,7 @@ namespace tissueform {
 // tissueform.v1.PredictionService over a store. Stateless; all pointers must outlive it.
 class PredictionService final : public v1::PredictionService::CallbackService {
  public:
-  PredictionService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  PredictionService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
                     MeshCatalog* catalog, SessionRegistry* registry, PredictionStore* store,
                     ExportQueue* exports, DeadlineTimer* timer)
       : gate_(gate),
@@ -53,10 +50,6 @@ class PredictionService final : public v1::PredictionService::CallbackService {
                                              google::protobuf::Empty* response) override;
 
  private:
-  // Finishes a call with what `work` says, which may block on the disk.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::string_view method,
-                                std::function<absl::Status(CallScope* scope)> work);
-
   absl::Status Find(CallScope* scope, const v1::GetPredictionRequest& request,
                     v1::Prediction* response);
   absl::Status List(const v1::ListPredictionsRequest& request, const Principal& caller,
@@ -65,7 +58,7 @@ class PredictionService final : public v1::PredictionService::CallbackService {
 
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access* const access_;
+  Access* const access_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   PredictionStore* const store_;

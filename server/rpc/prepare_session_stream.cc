@@ -34,17 +34,17 @@ v1::PreparationStage ToProto(SessionStage stage) {
 }  // namespace
 
 PrepareSessionStream::PrepareSessionStream(CallScope scope, const ServiceLimits& limits,
-                                           const Access& access, MeshCatalog* catalog,
+                                           Access* access, MeshCatalog* catalog,
                                            SessionRegistry* registry,
                                            const v1::PrepareSessionRequest& request,
                                            const Clock* clock)
     : scope_(std::move(scope)),
-      admission_(SessionPreparation::Authorise(access, request, &scope_)),
       clock_(clock),
       start_(clock->Now()),
       preparation_(std::make_shared<SessionPreparation>(
-          limits, catalog, registry, request,
+          limits, access, catalog, registry, request,
           [this](const SessionProgress& progress) { Tell(progress); },
+          [this](const std::string& resource) { TakeAllowed(resource); },
           [this](absl::StatusOr<v1::Session> result) { TakeResult(std::move(result)); })),
       pace_(clock) {
   // It goes on when that is done: then the library has bound the reactor.
@@ -53,7 +53,7 @@ PrepareSessionStream::PrepareSessionStream(CallScope scope, const ServiceLimits&
 
 void PrepareSessionStream::OnSendInitialMetadataDone(bool ok) {
   if (ok) {
-    preparation_->Start(admission_, scope_.principal());
+    preparation_->Start(scope_.admission(), scope_.principal());
   } else {
     preparation_->Cancel();
   }
@@ -81,6 +81,11 @@ void PrepareSessionStream::Tell(const SessionProgress& progress) {
   MutexLock lock(mutex_);
   pace_.Offer(progress);
   Advance();
+}
+
+void PrepareSessionStream::TakeAllowed(const std::string& resource) {
+  MutexLock lock(mutex_);
+  scope_.SetResource(resource);
 }
 
 void PrepareSessionStream::TakeResult(absl::StatusOr<v1::Session> result) {

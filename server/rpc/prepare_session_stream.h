@@ -27,7 +27,7 @@ namespace tissueform {
 class PrepareSessionStream : public grpc::ServerWriteReactor<v1::PrepareSessionResponse> {
  public:
   // `clock` and the pointers of the preparation must outlive the call.
-  PrepareSessionStream(CallScope scope, const ServiceLimits& limits, const Access& access,
+  PrepareSessionStream(CallScope scope, const ServiceLimits& limits, Access* access,
                        MeshCatalog* catalog, SessionRegistry* registry,
                        const v1::PrepareSessionRequest& request, const Clock* clock);
 
@@ -38,12 +38,12 @@ class PrepareSessionStream : public grpc::ServerWriteReactor<v1::PrepareSessionR
 
  private:
   void Tell(const SessionProgress& progress) ABSL_LOCKS_EXCLUDED(mutex_);
+  void TakeAllowed(const std::string& resource) ABSL_LOCKS_EXCLUDED(mutex_);
   void TakeResult(absl::StatusOr<v1::Session> result) ABSL_LOCKS_EXCLUDED(mutex_);
   // Writes what there is to say, or ends.
   void Advance() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   CallScope scope_;  // ended by who calls Finish
-  const absl::Status admission_;
   const Clock* const clock_;
   const Clock::TimePoint start_;
   const std::shared_ptr<SessionPreparation> preparation_;

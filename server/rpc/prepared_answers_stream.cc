@@ -46,21 +46,13 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
         registry_(registry),
         request_(request) {}
 
-  void Start(const Access& access) {
-    EndUnlessOk([this, &access]() -> absl::Status {
-      TF_RETURN_IF_ERROR(scope().admission());
-      TF_ASSIGN_OR_RETURN(const std::string id,
-                          AllowedSession(access, &scope(), request_.session(), Permission::kWrite));
-      if (!request_.has_prepared()) {
-        return absl::InvalidArgumentError("`prepared` is missing; set it as for the stream");
-      }
-      TF_ASSIGN_OR_RETURN(wanted_, ReadStreamRequest(ConfigurationOf(request_), limits_));
-      registry_->loader().Open(id, cancelled_,
-                               [this](absl::StatusOr<std::shared_ptr<Session>> session) {
-                                 EndUnlessOk([&] { return Choose(std::move(session)); });
-                               });
-      return absl::OkStatus();
-    });
+  void Start(Access* access) {
+    if (!scope().admission().ok()) {
+      End(scope().admission());
+      return;
+    }
+    registry_->pool().Post(Lane::kLeases,
+                           [this, access] { EndUnlessOk([&] { return Begin(access); }); });
   }
 
   void OnCancel() override {
@@ -73,6 +65,20 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
   template <typename Step>
   void EndUnlessOk(const Step& step) {
     if (const absl::Status status = step(); !status.ok()) End(status);
+  }
+
+  absl::Status Begin(Access* access) {
+    TF_ASSIGN_OR_RETURN(const std::string id,
+                        AllowedSession(access, &scope(), request_.session(), Permission::kWrite));
+    if (!request_.has_prepared()) {
+      return absl::InvalidArgumentError("`prepared` is missing; set it as for the stream");
+    }
+    TF_ASSIGN_OR_RETURN(wanted_, ReadStreamRequest(ConfigurationOf(request_), limits_));
+    registry_->loader().Open(id, cancelled_,
+                             [this](absl::StatusOr<std::shared_ptr<Session>> session) {
+                               EndUnlessOk([&] { return Choose(std::move(session)); });
+                             });
+    return absl::OkStatus();
   }
 
   absl::Status Choose(absl::StatusOr<std::shared_ptr<Session>> session) {
@@ -158,7 +164,7 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
 
 grpc::ServerWriteReactor<v1::GetPreparedAnswersResponse>* StartPreparedAnswers(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    const ServiceLimits& limits, const Access& access, SessionRegistry* registry,
+    const ServiceLimits& limits, Access* access, SessionRegistry* registry,
     const v1::GetPreparedAnswersRequest* request) {
   auto* call = new PreparedAnswersStream(std::move(scope), CancelOf(context), timer, limits,
                                          registry, *request);

@@ -19,7 +19,7 @@ namespace tissueform {
 // ends.
 grpc::ServerWriteReactor<v1::GetPreparedAnswersResponse>* StartPreparedAnswers(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
-    const ServiceLimits& limits, const Access& access, SessionRegistry* registry,
+    const ServiceLimits& limits, Access* access, SessionRegistry* registry,
     const v1::GetPreparedAnswersRequest* request);
 
 }  // namespace tissueform

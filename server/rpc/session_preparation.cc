@@ -15,40 +15,58 @@
 
 namespace tissueform {
 
-SessionPreparation::SessionPreparation(const ServiceLimits& limits, MeshCatalog* catalog,
-                                       SessionRegistry* registry, v1::PrepareSessionRequest request,
-                                       TellSession tell, Done done)
+SessionPreparation::SessionPreparation(const ServiceLimits& limits, Access* access,
+                                       MeshCatalog* catalog, SessionRegistry* registry,
+                                       v1::PrepareSessionRequest request, TellSession tell,
+                                       OnAllowed on_allowed, Done done)
     : limits_(limits),
+      access_(access),
       catalog_(catalog),
       registry_(registry),
       request_(std::move(request)),
       tell_(std::move(tell)),
+      on_allowed_(std::move(on_allowed)),
       done_(std::move(done)) {}
 
-absl::Status SessionPreparation::Authorise(const Access& access,
-                                           const v1::PrepareSessionRequest& request,
-                                           CallScope* scope) {
-  TF_RETURN_IF_ERROR(scope->admission());
-  switch (request.what_case()) {
+absl::Status SessionPreparation::AuthorizeUse(const Principal& caller, const std::string& name,
+                                              Permission need) {
+  TF_ASSIGN_OR_RETURN(const std::string id, ParseSessionName(name));
+  TF_ASSIGN_OR_RETURN(const Access::Found found, access_->CheckSessionAccess(caller, id, need));
+  MutexLock lock(mutex_);  // so that `done` comes after it
+  if (done_ && found == Access::Found::kYes) on_allowed_(name);
+  return absl::OkStatus();
+}
+
+absl::Status SessionPreparation::Authorize(const Principal& caller) {
+  switch (request_.what_case()) {
     case v1::PrepareSessionRequest::kCreate: {
-      TF_ASSIGN_OR_RETURN(const std::string mesh, ParseMeshName(request.create().mesh()));
-      TF_RETURN_IF_ERROR(access.CheckMeshAccess(scope->principal(), mesh, Permission::kRead));
-      return Access::CheckProjectAccess(scope->principal(), request.create().project());
+      TF_ASSIGN_OR_RETURN(const std::string mesh, ParseMeshName(request_.create().mesh()));
+      TF_RETURN_IF_ERROR(access_->CheckMeshAccess(caller, mesh, Permission::kRead));
+      return Access::CheckProjectAccess(caller, request_.create().project());
     }
     case v1::PrepareSessionRequest::kUpdate:
-      return AllowedSession(access, scope, request.update().name(), Permission::kOwner).status();
+      return AuthorizeUse(caller, request_.update().name(), Permission::kOwner);
     case v1::PrepareSessionRequest::kOpen:
-      return AllowedSession(access, scope, request.open(), Permission::kWrite).status();
+      return AuthorizeUse(caller, request_.open(), Permission::kWrite);
     case v1::PrepareSessionRequest::WHAT_NOT_SET:
       break;
   }
-  return absl::OkStatus();  // refused by who begins
+  return absl::OkStatus();  // refused by Begin
 }
 
 void SessionPreparation::Start(const absl::Status& admission, const Principal& caller) {
-  if (*cancelled_) return;
-  const absl::Status begun = admission.ok() ? Begin(caller) : admission;
-  if (!begun.ok()) Finish(begun);
+  if (!admission.ok()) {
+    Finish(admission);
+    return;
+  }
+  // A creation reads a mesh here; the others only ask, and must not wait behind such reads.
+  const Lane lane = request_.has_create() ? Lane::kStore : Lane::kLeases;
+  registry_->pool().Post(lane, [self = shared_from_this(), caller] {
+    if (*self->cancelled_) return;
+    absl::Status begun = self->Authorize(caller);
+    if (begun.ok()) begun = self->Begin(caller);
+    if (!begun.ok()) self->Finish(begun);
+  });
 }
 
 absl::Status SessionPreparation::Begin(const Principal& caller) {
@@ -69,12 +87,8 @@ absl::Status SessionPreparation::BeginCreation(const Principal& caller) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request_.create().mesh()));
   if (auto mesh = catalog_->Find(sha256); mesh != nullptr) return Make(caller, mesh);
   Tell({SessionStage::kReadingMesh});
-  registry_->pool().Post(Lane::kStore, [self = shared_from_this(), sha256, caller] {
-    const absl::StatusOr<std::shared_ptr<const StoredMesh>> mesh = self->catalog_->Load(sha256);
-    const absl::Status status = mesh.ok() ? self->Make(caller, *mesh) : mesh.status();
-    if (!status.ok()) self->Finish(status);
-  });
-  return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<const StoredMesh> mesh, catalog_->Load(sha256));
+  return Make(caller, mesh);
 }
 
 absl::Status SessionPreparation::Make(const Principal& caller,

@@ -33,21 +33,19 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   // From the calling thread, or from any other.
   using Done = std::function<void(absl::StatusOr<v1::Session> session)>;
 
-  // `tell` (may be empty) is not called any more once `done` is. Both may take locks of their own,
-  // under which nobody calls this object. The pointers must outlive it.
-  SessionPreparation(const ServiceLimits& limits, MeshCatalog* catalog, SessionRegistry* registry,
-                     v1::PrepareSessionRequest request, TellSession tell, Done done);
+  // Gets the name of the session that the call may use.
+  using OnAllowed = std::function<void(const std::string& resource)>;
 
-  // Whether the call may do what it asks for; its admission first. Errors: InvalidArgument (the
-  // names), those of Access.
-  static absl::Status Authorise(const Access& access, const v1::PrepareSessionRequest& request,
-                                CallScope* scope);
+  // `tell` (may be empty) and `on_allowed` are not called any more once `done` is. All may take
+  // locks of their own, under which nobody calls this object. The pointers must outlive it.
+  SessionPreparation(const ServiceLimits& limits, Access* access, MeshCatalog* catalog,
+                     SessionRegistry* registry, v1::PrepareSessionRequest request, TellSession tell,
+                     OnAllowed on_allowed, Done done);
 
-  // Once. `admission` is why the call is not served (see Authorise), or OK; `caller` whose session
-  // it will be.
+  // Once. `admission` is why the call is not served, or OK; `caller` whose session it will be.
   //
-  // Errors: InvalidArgument (the request), those of MeshCatalog::Load, SessionLoader::Create,
-  // Update, Open and Look, and of PrepareAnswers; Cancelled.
+  // Errors: InvalidArgument (the request), those of Access, MeshCatalog::Load,
+  // SessionLoader::Create, Update, Open and Look, and of PrepareAnswers; Cancelled.
   void Start(const absl::Status& admission, const Principal& caller);
 
   // Any time.
@@ -58,6 +56,10 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   void EndOfCall();
 
  private:
+  // Whether the caller may do what it asks for. Blocks on the store.
+  absl::Status Authorize(const Principal& caller) ABSL_LOCKS_EXCLUDED(mutex_);
+  absl::Status AuthorizeUse(const Principal& caller, const std::string& name, Permission need)
+      ABSL_LOCKS_EXCLUDED(mutex_);
   absl::Status Begin(const Principal& caller);
   absl::Status BeginCreation(const Principal& caller);
   absl::Status BeginUpdate();
@@ -82,10 +84,12 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
 
   // Constant.
   const ServiceLimits limits_;
+  Access* const access_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   const v1::PrepareSessionRequest request_;
   const TellSession tell_;
+  const OnAllowed on_allowed_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
 
   Mutex mutex_;

@@ -4,6 +4,8 @@
 #include "server/rpc/session_service.h"
 
 #include <memory>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -19,13 +21,13 @@ namespace {
 // One CreateSession or UpdateSession call. Deletes itself when gRPC is done with it.
 class PreparationCall : public grpc::ServerUnaryReactor {
  public:
-  PreparationCall(CallScope scope, const ServiceLimits& limits, const Access& access,
+  PreparationCall(CallScope scope, const ServiceLimits& limits, Access* access,
                   MeshCatalog* catalog, SessionRegistry* registry,
                   v1::PrepareSessionRequest request, v1::Session* response)
       : scope_(std::move(scope)),
-        admission_(SessionPreparation::Authorise(access, request, &scope_)),
         preparation_(std::make_shared<SessionPreparation>(
-            limits, catalog, registry, std::move(request), /*tell=*/nullptr,
+            limits, access, catalog, registry, std::move(request), /*tell=*/nullptr,
+            [this](const std::string& resource) { scope_.SetResource(resource); },
             [this, response](absl::StatusOr<v1::Session> session) {
               const absl::Status outcome = session.status();
               if (session.ok()) {
@@ -35,7 +37,7 @@ class PreparationCall : public grpc::ServerUnaryReactor {
               Finish(scope_.End(outcome));
             })) {}
 
-  void Start() { preparation_->Start(admission_, scope_.principal()); }
+  void Start() { preparation_->Start(scope_.admission(), scope_.principal()); }
 
   void OnCancel() override { preparation_->Cancel(); }
 
@@ -46,7 +48,6 @@ class PreparationCall : public grpc::ServerUnaryReactor {
 
  private:
   CallScope scope_;
-  const absl::Status admission_;
   const std::shared_ptr<SessionPreparation> preparation_;
 };
 
@@ -67,8 +68,8 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::Session* response) {
-  return HandleUnaryCall(
-      context, "SessionService.GetSession", gate_,
+  return HandleUnaryCallIn(
+      Lane::kLeases, &registry_->pool(), context, "SessionService.GetSession", gate_,
       [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string id,
                             AllowedSession(access_, &scope, request->name(), Permission::kRead));
@@ -88,20 +89,30 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
       [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const PageRequest page,
                             ReadPageRequest(request->page_size(), request->page_token()));
-        registry_->sync().List({.owner = scope.principal().name,
-                                .also = access_.SharedSessions(scope.principal()),
-                                .after = page.after,
-                                .limit = page.size},
-                               [end, response](const absl::StatusOr<SessionViewPage>& views) {
-                                 if (views.ok()) {
-                                   for (const SessionView& view : views->views) {
-                                     *response->add_sessions() = ToProto(view);
-                                   }
-                                   response->set_next_page_token(views->next);
-                                 }
-                                 end(views.status());
-                               });
+        registry_->pool().Post(Lane::kStore, [=, this, caller = scope.principal()] {
+          ListSessionsOf(caller, page, response, end);
+        });
         return absl::OkStatus();
+      });
+}
+
+void SessionService::ListSessionsOf(const Principal& caller, const PageRequest& page,
+                                    v1::ListSessionsResponse* response, const FinishCall& end) {
+  absl::StatusOr<std::set<std::string>> shared = access_->SharedSessions(caller);
+  if (!shared.ok()) {
+    end(shared.status());
+    return;
+  }
+  registry_->sync().List(
+      {.owner = caller.name, .also = *std::move(shared), .after = page.after, .limit = page.size},
+      [end, response](const absl::StatusOr<SessionViewPage>& views) {
+        if (views.ok()) {
+          for (const SessionView& view : views->views) {
+            *response->add_sessions() = ToProto(view);
+          }
+          response->set_next_page_token(views->next);
+        }
+        end(views.status());
       });
 }
 
@@ -127,8 +138,8 @@ grpc::ServerWriteReactor<v1::PrepareSessionResponse>* SessionService::PrepareSes
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         google::protobuf::Empty* /*response*/) {
-  return HandleUnaryCall(
-      context, "SessionService.DeleteSession", gate_,
+  return HandleUnaryCallIn(
+      Lane::kLeases, &registry_->pool(), context, "SessionService.DeleteSession", gate_,
       [=, this](CallScope& scope, const FinishCall& end) -> absl::Status {
         TF_ASSIGN_OR_RETURN(const std::string id,
                             AllowedSession(access_, &scope, request->name(), Permission::kOwner));

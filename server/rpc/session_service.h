@@ -9,6 +9,7 @@
 
 #include "server/access/access.h"
 #include "server/rpc/calls/call_scope.h"
+#include "server/rpc/resource_conversion.h"
 #include "server/session/clock.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
@@ -20,12 +21,12 @@ namespace tissueform {
 // tissueform.v1.SessionService over a registry. Stateless; all pointers must outlive it.
 class SessionService final : public v1::SessionService::CallbackService {
  public:
-  SessionService(AdmissionControl* gate, const ServiceLimits& limits, const Access* access,
+  SessionService(AdmissionControl* gate, const ServiceLimits& limits, Access* access,
                  MeshCatalog* catalog, SessionRegistry* registry,
                  const Clock* clock = Clock::System())
       : gate_(gate),
         limits_(limits),
-        access_(*access),
+        access_(access),
         catalog_(catalog),
         registry_(registry),
         clock_(clock) {}
@@ -49,9 +50,13 @@ class SessionService final : public v1::SessionService::CallbackService {
                                           google::protobuf::Empty* response) override;
 
  private:
+  // Blocks on the store, then ends the call.
+  void ListSessionsOf(const Principal& caller, const PageRequest& page,
+                      v1::ListSessionsResponse* response, const FinishCall& end);
+
   AdmissionControl* const gate_;
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   const Clock* const clock_;

@@ -5,11 +5,13 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 
 #include "absl/status/status.h"
 
 #include "core/base/mutex.h"
 #include "server/session/deadline_timer.h"
+#include "server/session/worker_pool.h"
 
 namespace tissueform {
 
@@ -18,30 +20,41 @@ namespace tissueform {
 // Thread-safe.
 class StreamAuthorization {
  public:
-  // Both are called on the timer's thread, without a lock of this object. `check` is OK while the
-  // caller may go on. `end` gets the first other status, and nothing is asked after that.
-  using Check = std::function<absl::Status()>;
+  // Waits for the store and may outlive the stream, so it holds copies of what it needs.
+  using Question = std::function<absl::Status()>;
+  // Makes the question, on the timer's thread. Empty: nothing to ask this time.
+  using MakeQuestion = std::function<Question()>;
+  // Gets the first status that is not OK, in Lane::kLeases; nothing is asked after that.
   using End = std::function<void(const absl::Status& status)>;
 
-  // `timer` must outlive it.
-  StreamAuthorization(DeadlineTimer* timer, std::chrono::milliseconds period, Check check, End end);
+  // `make` and `end` are called without a lock of this object. `timer` and `pool` must outlive it.
+  StreamAuthorization(DeadlineTimer* timer, WorkerPool* pool, std::chrono::milliseconds period,
+                      MakeQuestion make, End end);
 
-  void Start() ABSL_LOCKS_EXCLUDED(mutex_);
-  // Once it has returned, nothing is asked any more. Not with a lock held that `check` or `end`
-  // takes. Also where it was not started.
-  void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
+  void Start();
+  // Once it has returned, nothing is called any more; a question that waits for the store is not
+  // waited for. Not with a lock held that `make` or `end` takes. Also where it was not started.
+  void Stop();
 
  private:
-  void Recheck() ABSL_LOCKS_EXCLUDED(mutex_);
+  // Questions hold it, too.
+  struct State {
+    Mutex mutex;  // innermost but for the timer's
+    ConditionVariable answered;
+    bool stopped ABSL_GUARDED_BY(mutex) = false;
+    bool calling ABSL_GUARDED_BY(mutex) = false;  // `end`, or the next start
+    DeadlineTimer::Id next ABSL_GUARDED_BY(mutex);
+  };
+
+  void Ask();
+  void TakeAnswer(const absl::Status& status);
 
   DeadlineTimer* const timer_;
+  WorkerPool* const pool_;
   const std::chrono::milliseconds period_;
-  const Check check_;
+  const MakeQuestion make_;
   const End end_;
-
-  Mutex mutex_;  // innermost but for the timer's
-  bool stopped_ ABSL_GUARDED_BY(mutex_) = false;
-  DeadlineTimer::Id next_ ABSL_GUARDED_BY(mutex_);
+  const std::shared_ptr<State> state_ = std::make_shared<State>();
 };
 
 }  // namespace tissueform

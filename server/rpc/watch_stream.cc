@@ -50,7 +50,7 @@ absl::StatusOr<std::string> ParseWatchName(const std::string& name) {
 }
 
 WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request,
-                                       const ServiceLimits& limits, const Access& access,
+                                       const ServiceLimits& limits, Access* access,
                                        SessionRegistry* registry, SessionWatches* watches,
                                        DeadlineTimer* timer)
     : scope_(std::move(scope)),
@@ -60,13 +60,16 @@ WatchStreamReactor::WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& 
       watches_(watches),
       timer_(timer),
       id_(RandomId()),
-      principal_(scope_.principal().name) {
+      principal_(scope_.principal().name),
+      authorization_(
+          timer, &registry->pool(), kReauthorizePeriod, [this] { return AuthorizationQuestion(); },
+          [this](const absl::Status& status) { EndUnauthorized(status); }) {
   const absl::Status admission =
       scope_.admission().ok() ? ReadRequest(request) : scope_.admission();
   MutexLock lock(mutex_);
   if (admission.ok()) {
     opening_ = true;
-    WaitToReauthorize();
+    if (scope_.may_end_early()) authorization_.Start();
     // Opening goes on when that is done: then the library has bound the reactor.
     StartSendInitialMetadata();
   } else {
@@ -81,8 +84,7 @@ absl::Status WatchStreamReactor::ReadRequest(const grpc::ByteBuffer& bytes) {
   if (!grpc::SerializationTraits<v1::WatchRequest>::Deserialize(&copy, &request).ok()) {
     return absl::InvalidArgumentError("the request is not a WatchRequest");
   }
-  TF_ASSIGN_OR_RETURN(session_id_,
-                      AllowedSession(access_, &scope_, request.session(), Permission::kRead));
+  TF_ASSIGN_OR_RETURN(session_id_, ParseSessionName(request.session()));
   if (!request.has_max_unacked()) return absl::OkStatus();
   max_unacked_ = request.max_unacked();
   if (max_unacked_ >= 1 && max_unacked_ <= limits_.max_unacked) return absl::OkStatus();
@@ -95,7 +97,17 @@ void WatchStreamReactor::OnSendInitialMetadataDone(bool ok) {
     FinishOpening(absl::CancelledError("the client is gone"));
     return;
   }
-  registry_->pool().Post(Lane::kFrames, [this] {
+  registry_->pool().Post(Lane::kLeases, [this, caller = scope_.principal()] {
+    const absl::StatusOr<Access::Found> found =
+        access_->CheckSessionAccess(caller, session_id_, Permission::kRead);
+    if (!found.ok()) {
+      FinishOpening(found.status());
+      return;
+    }
+    if (*found == Access::Found::kYes) {
+      MutexLock lock(mutex_);
+      scope_.SetResource(SessionName(session_id_));
+    }
     registry_->loader().Open(session_id_, cancelled_,
                              [this](absl::StatusOr<std::shared_ptr<Session>> session) {
                                TakeSession(std::move(session));
@@ -176,36 +188,27 @@ void WatchStreamReactor::OnCancel() {
 
 void WatchStreamReactor::OnDone() {
   watches_->Remove(id_);
-  DeadlineTimer::Id standing;
+  authorization_.Stop();
   {
     MutexLock lock(mutex_);  // whoever called Finish may still hold it
-    standing = standing_;
   }
-  timer_->Cancel(standing);
   delete this;
 }
 
-void WatchStreamReactor::WaitToReauthorize() {
-  if (!scope_.may_end_early()) return;
-  standing_ = timer_->Start(std::chrono::steady_clock::now() + kReauthorizePeriod,
-                            [this] { RecheckAuthorization(); });
+StreamAuthorization::Question WatchStreamReactor::AuthorizationQuestion() {
+  MutexLock lock(mutex_);
+  if (finished_) return {};
+  return [still_good = scope_.AuthorizationQuestion(), access = access_,
+          caller = scope_.principal(), session = session_id_]() -> absl::Status {
+    TF_RETURN_IF_ERROR(still_good());
+    return access->RecheckSessionAccess(caller, session, Permission::kRead);
+  };
 }
 
-absl::Status WatchStreamReactor::IsStillAllowed() const {
-  TF_RETURN_IF_ERROR(scope_.IsStillAuthorized());
-  return access_.RecheckSessionAccess(scope_.principal(), session_id_, Permission::kRead);
-}
-
-void WatchStreamReactor::RecheckAuthorization() {
+void WatchStreamReactor::EndUnauthorized(const absl::Status& status) {
   {
     MutexLock lock(mutex_);
-    if (finished_) return;
-    const absl::Status good = IsStillAllowed();
-    if (good.ok()) {
-      WaitToReauthorize();
-      return;
-    }
-    End(good);
+    End(status);
   }
   // As in OnCancel, with the outcome that is there already.
   *cancelled_ = true;

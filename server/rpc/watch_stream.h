@@ -19,6 +19,7 @@
 #include "core/mechanics/constraints/handle_pose.h"
 #include "server/access/access.h"
 #include "server/rpc/calls/call_scope.h"
+#include "server/rpc/stream_authorization.h"
 #include "server/rpc/watches/session_watches.h"
 #include "server/session/deadline_timer.h"
 #include "server/session/limits.h"
@@ -39,7 +40,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
  public:
   // `request` is a WatchRequest; all other pointers must outlive the stream.
   WatchStreamReactor(CallScope scope, const grpc::ByteBuffer& request, const ServiceLimits& limits,
-                     const Access& access, SessionRegistry* registry, SessionWatches* watches,
+                     Access* access, SessionRegistry* registry, SessionWatches* watches,
                      DeadlineTimer* timer);
 
   void OnSendInitialMetadataDone(bool ok) override;
@@ -54,9 +55,8 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
  private:
   // The caller's token may have ended, or the caller may have lost the right to watch the session.
-  void WaitToReauthorize() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status IsStillAllowed() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void RecheckAuthorization() ABSL_LOCKS_EXCLUDED(mutex_);
+  StreamAuthorization::Question AuthorizationQuestion() ABSL_LOCKS_EXCLUDED(mutex_);
+  void EndUnauthorized(const absl::Status& status) ABSL_LOCKS_EXCLUDED(mutex_);
 
   absl::Status ReadRequest(const grpc::ByteBuffer& bytes);
 
@@ -76,7 +76,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   // Constant after the constructor.
   const ServiceLimits limits_;
-  const Access& access_;
+  Access* const access_;
   SessionRegistry* const registry_;
   SessionWatches* const watches_;
   DeadlineTimer* const timer_;
@@ -86,6 +86,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   int max_unacked_ = 2;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
 
+  StreamAuthorization authorization_;
   std::shared_ptr<WatchChannel> channel_;  // of who opens
 
   Mutex mutex_;
@@ -97,7 +98,6 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   std::deque<v1::DeformNotice> notices_ ABSL_GUARDED_BY(mutex_);
   std::deque<uint64_t> unacked_ ABSL_GUARDED_BY(mutex_);  // rising
   uint64_t last_sent_ ABSL_GUARDED_BY(mutex_) = 0;
-  DeadlineTimer::Id standing_ ABSL_GUARDED_BY(mutex_);  // the next check; Id(): there is none
   bool finished_ ABSL_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> ending_ ABSL_GUARDED_BY(mutex_);   // after what may still be sent
   std::optional<absl::Status> outcome_ ABSL_GUARDED_BY(mutex_);  // set: nothing new is started

@@ -54,6 +54,20 @@ int SessionTable::size() const {
   return CountLoaded();
 }
 
+std::vector<std::string> SessionTable::KnownIds() const {
+  MutexLock lock(mutex_);
+  std::vector<std::string> ids;
+  ids.reserve(entries_.size());
+  for (const auto& [id, entry] : entries_) ids.push_back(id);
+  return ids;
+}
+
+std::string SessionTable::OwnerOf(const std::string& id) const {
+  MutexLock lock(mutex_);
+  const auto found = entries_.find(id);
+  return found == entries_.end() ? "" : found->second.owner;
+}
+
 int SessionTable::CountKnown() const {
   MutexLock lock(mutex_);
   return static_cast<int>(entries_.size());

@@ -90,6 +90,9 @@ class SessionTable {
   std::vector<std::shared_ptr<Session>> Loaded() const;
   int size() const;
   // In memory or not.
+  std::vector<std::string> KnownIds() const;
+  // Empty where it is not known, or nobody with a name has it.
+  std::string OwnerOf(const std::string& id) const;
   int CountKnown() const;
   // In memory or not, those that are being created and those whose record is not deleted yet.
   int CountMadeFrom(const std::string& mesh_sha256) const;

@@ -24,7 +24,8 @@ enum class Lane {
   kFrames,      // products of prepared answers: below a millisecond, somebody looks at it
   kSolves,      // one back-substitution, and what ends sessions
   kIterations,  // answers of many solves
-  kLeases,      // takes sessions and gives them back: waits for the store, 2 s at most
+  kLeases,      // takes sessions, gives them back, asks who may use them: waits 2 s at most for the
+                // store
   kStore,       // waits for the store: a disk, or a database that may be away for half a minute
   kBatch,       // factorisations, checks of meshes: seconds
 };

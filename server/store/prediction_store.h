@@ -14,6 +14,9 @@
 
 namespace tissueform {
 
+// Of a prediction's positions: x, y and z as float32.
+inline constexpr int64_t kVertexBytes = 3 * int64_t{sizeof(float)};
+
 // What is kept of a prediction beside its positions.
 struct PredictionRecord {
   std::string id;  // one in a store

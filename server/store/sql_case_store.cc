@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "server/store/access_queries.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_records.h"
 #include "server/store/store_rows.h"
@@ -53,9 +54,12 @@ absl::StatusOr<CaseRecord> KeepRow(SqlTransaction& transaction, const CaseRecord
   const std::string bytes = Seal(SerializeCaseRecord(record));
   // Replaces an unreadable row.
   TF_RETURN_IF_ERROR(transaction.Run(
-      "INSERT INTO cases (sha256, owner, record, last_used_s) VALUES ($1, $2, $3, $4) ON CONFLICT "
-      "(sha256, owner) DO UPDATE SET record = excluded.record, last_used_s = excluded.last_used_s",
-      {record.sha256, record.owner, SqlBytes{bytes}, record.last_used_s}));
+      "INSERT INTO cases (sha256, owner, record, last_used_s, project, bytes) VALUES ($1, $2, $3, "
+      "$4, "
+      "$5, $6) ON CONFLICT (sha256, owner) DO UPDATE SET record = excluded.record, last_used_s = "
+      "excluded.last_used_s, project = excluded.project, bytes = excluded.bytes",
+      {record.sha256, record.owner, SqlBytes{bytes}, record.last_used_s, record.project,
+       record.total_bytes}));
   return record;
 }
 
@@ -172,6 +176,7 @@ absl::Status SqlCaseStore::DeleteUnused(const CaseKey& key, int64_t before_s) {
                           "RETURNING key",
                           {key.sha256, key.owner, before_s}));
     if (rows.empty()) return NoCase(key.sha256);
+    TF_RETURN_IF_ERROR(EraseAccessToCase(transaction, key));
     return Names{key.sha256};
   });
 }

@@ -86,6 +86,8 @@ struct SqlJob {
   bool repeatable = false;
   // Deleted data is gone from the database's files before the answer (docs/operations.md).
   bool erases = false;
+  // Run gives up after 2 s where servers share the database; Submit ignores it.
+  bool brief = false;
 };
 
 // A database, or this server's connections to it.
@@ -105,8 +107,7 @@ class SqlDatabase {
   // Returns at once or soon. Jobs of one key run in the order of their calls. `done` is called
   // once, on any thread, without a lock held.
   virtual void Submit(const std::string& key, SqlJob job, StatusCallback done) = 0;
-  // As Submit, but does not wait for earlier jobs; takes at most 2 s where servers share the
-  // database.
+  // As Submit, but does not wait for earlier jobs, and gives up as a brief job does.
   virtual void Peek(const std::string& key, SqlJob job, StatusCallback done) = 0;
 
   // Whether other servers use it too.

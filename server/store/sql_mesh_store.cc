@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "server/store/access_queries.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_records.h"
 #include "server/store/store_rows.h"
@@ -121,6 +122,7 @@ absl::Status SqlMeshStore::Delete(const std::string& sha256) {
         const SqlRows rows,
         transaction.Query("DELETE FROM meshes WHERE sha256 = $1 RETURNING key", {sha256}));
     if (rows.empty()) return NoMesh(sha256);
+    TF_RETURN_IF_ERROR(EraseAccessToMesh(transaction, sha256));
     return Names{sha256};
   });
 }

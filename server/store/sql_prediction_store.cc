@@ -10,13 +10,13 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh/payload/sha256.h"
+#include "server/store/access_queries.h"
 #include "server/store/store_errors.h"
+#include "server/store/store_index.h"
 #include "server/store/store_rows.h"
 
 namespace tissueform {
 namespace {
-
-constexpr int64_t kVertexBytes = 12;
 
 absl::StatusOr<PredictionRow> FindRow(SqlTransaction& transaction, const std::string& id) {
   TF_ASSIGN_OR_RETURN(const SqlRows rows,
@@ -47,10 +47,10 @@ absl::Status SqlPredictionStore::Create(const PredictionRecord& record,
     TF_ASSIGN_OR_RETURN(
         const SqlRows rows,
         transaction.Query("INSERT INTO predictions (id, owner, session, case_sha256, "
-                          "positions_sha256, record) VALUES ($1, $2, $3, $4, $5, $6) ON CONFLICT "
-                          "(id) DO NOTHING RETURNING key",
+                          "positions_sha256, record, mesh_sha256, bytes) VALUES ($1, $2, $3, $4, "
+                          "$5, $6, $7, $8) ON CONFLICT (id) DO NOTHING RETURNING key",
                           {record.id, record.owner, record.session, record.case_sha256, sha256,
-                           SqlBytes{bytes}}));
+                           SqlBytes{bytes}, record.mesh_sha256, BytesOf(record)}));
     return rows.empty() ? PredictionExists(record.id) : absl::OkStatus();
   });
 }
@@ -107,9 +107,10 @@ absl::Status SqlPredictionStore::Delete(const std::string& id) {
     TF_ASSIGN_OR_RETURN(
         const SqlRows rows,
         transaction.Query(
-            "DELETE FROM predictions WHERE id = $1 AND positions_sha256 = $2 RETURNING key",
+            "DELETE FROM predictions WHERE id = $1 AND positions_sha256 = $2 RETURNING owner",
             {id, sha256}));
     if (rows.empty()) return NoPrediction(id);
+    TF_RETURN_IF_ERROR(EraseAccessToPrediction(transaction, std::string(rows.Text(0, 0)), id));
     return Names{sha256};
   });
 }

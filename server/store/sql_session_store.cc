@@ -8,6 +8,7 @@
 
 #include "core/base/random_id.h"
 #include "core/base/status_macros.h"
+#include "server/store/access_queries.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_records.h"
 #include "server/store/store_rows.h"
@@ -53,12 +54,13 @@ absl::Status LockMeshOf(SqlTransaction& transaction, const SessionRecord& record
 // cannot be deleted. Errors: AlreadyExists.
 absl::StatusOr<int64_t> Insert(SqlTransaction& transaction, const SessionRecord& record) {
   const SealedSession sealed(record);
-  TF_ASSIGN_OR_RETURN(
-      const SqlRows rows,
-      transaction.Query(
-          "INSERT INTO sessions (id, owner, record, mesh) VALUES ($1, $2, $3, (SELECT sha256 FROM "
-          "meshes WHERE sha256 = $4)) ON CONFLICT (id) DO NOTHING RETURNING key",
-          {record.id, record.owner, SqlBytes{sealed.record}, record.mesh_sha256}));
+  TF_ASSIGN_OR_RETURN(const SqlRows rows,
+                      transaction.Query("INSERT INTO sessions (id, owner, record, mesh_sha256, "
+                                        "project, mesh) VALUES ($1, $2, $3, $4, "
+                                        "$5, (SELECT sha256 FROM meshes WHERE sha256 = $4)) ON "
+                                        "CONFLICT (id) DO NOTHING RETURNING key",
+                                        {record.id, record.owner, SqlBytes{sealed.record},
+                                         record.mesh_sha256, record.project}));
   if (rows.empty()) return SessionExists(record.id);
   // After the id was found free: an earlier holder of a session of this id has a lower epoch.
   static_assert(kFreshEpoch == 0);
@@ -76,8 +78,9 @@ absl::StatusOr<int64_t> Insert(SqlTransaction& transaction, const SessionRecord&
 
 absl::Status Replace(SqlTransaction& transaction, int64_t key, const SessionRecord& record) {
   const SealedSession sealed(record);
-  TF_RETURN_IF_ERROR(transaction.Run("UPDATE sessions SET owner = $1, record = $2 WHERE key = $3",
-                                     {record.owner, SqlBytes{sealed.record}, key}));
+  TF_RETURN_IF_ERROR(
+      transaction.Run("UPDATE sessions SET owner = $1, record = $2, project = $3 WHERE key = $4",
+                      {record.owner, SqlBytes{sealed.record}, record.project, key}));
   return transaction.Run(
       "UPDATE session_states SET etag = $1, epoch = $2, handles = $3, poses = $4, last_used_s = $5 "
       "WHERE key = $6",
@@ -209,7 +212,10 @@ void SqlSessionStore::Delete(const std::string& id, const std::string& etag, int
       {.work = [id, etag, epoch](SqlTransaction& transaction) -> absl::Status {
          TF_ASSIGN_OR_RETURN(const LockedState state, LockState(transaction, id));
          TF_RETURN_IF_ERROR(CheckSessionWrite(id, etag, epoch, state.etag, state.epoch));
-         return transaction.Run("DELETE FROM sessions WHERE key = $1", {state.key});
+         TF_ASSIGN_OR_RETURN(
+             const SqlRows rows,
+             transaction.Query("DELETE FROM sessions WHERE key = $1 RETURNING owner", {state.key}));
+         return EraseAccessToSession(transaction, std::string(rows.Text(0, 0)), id);
        },
        .erases = true},
       std::move(done));

@@ -134,7 +134,6 @@ absl::Status CheckMeshRecord(const MeshRecord& record, const MeshPayloadView& pa
 }
 
 absl::Status CheckPrediction(const PredictionRecord& record, const std::string& positions) {
-  constexpr int64_t kVertexBytes = 3 * int64_t{sizeof(float)};
   if (record.id.empty()) return absl::InvalidArgumentError("a prediction needs an id");
   const auto bytes = static_cast<int64_t>(positions.size());
   if (bytes % kVertexBytes != 0 || bytes / kVertexBytes != record.vertex_count) {

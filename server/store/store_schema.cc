@@ -15,6 +15,8 @@
 #include "core/base/status_macros.h"
 #include "server/platform/storage/fault_points.h"
 #include "server/store/session_record.h"
+#include "server/store/sqlite_database.h"
+#include "server/store/store_index.h"
 #include "server/store/store_records.h"
 
 namespace tissueform {
@@ -68,6 +70,33 @@ constexpr char kVersion6[] =
     "CREATE INDEX sessions_by_mesh ON sessions(mesh);"
     "ALTER TABLE exports ADD COLUMN version INTEGER NOT NULL DEFAULT 0;";
 
+constexpr char kVersion7[] =
+    "ALTER TABLE sessions ADD COLUMN mesh_sha256 TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE sessions ADD COLUMN project TEXT NOT NULL DEFAULT '';"
+    "CREATE INDEX sessions_by_mesh_sha256 ON sessions(mesh_sha256, owner);"
+    "CREATE INDEX sessions_by_owner ON sessions(owner, project);"
+    "ALTER TABLE predictions ADD COLUMN mesh_sha256 TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE predictions ADD COLUMN bytes INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX predictions_by_mesh_sha256 ON predictions(mesh_sha256, owner);"
+    "CREATE INDEX predictions_by_owner ON predictions(owner, session);"
+    "ALTER TABLE cases ADD COLUMN project TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE cases ADD COLUMN bytes INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX cases_by_owner ON cases(owner, project);"
+    "ALTER TABLE shares ADD COLUMN owner TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE shares ADD COLUMN resource TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE shares ADD COLUMN principal TEXT NOT NULL DEFAULT '';"
+    "CREATE INDEX shares_by_principal ON shares(principal, owner, resource);"
+    "CREATE INDEX shares_by_resource ON shares(resource, owner);"
+    "ALTER TABLE follow_links ADD COLUMN session TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE follow_links ADD COLUMN maker TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE follow_links ADD COLUMN expires_s INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX follow_links_by_session ON follow_links(session);"
+    "ALTER TABLE mesh_rights ADD COLUMN principal TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE mesh_rights ADD COLUMN sha256 TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE mesh_rights ADD COLUMN bytes INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX mesh_rights_by_principal ON mesh_rights(principal);"
+    "CREATE INDEX mesh_rights_by_sha256 ON mesh_rights(sha256);";
+
 absl::StatusOr<int64_t> Pragma(Database& database, const char* sql) {
   Database::Query query = database.Prepare(sql);
   TF_ASSIGN_OR_RETURN(const bool row, query.Step());
@@ -113,6 +142,10 @@ absl::Status Change(Database& database, int64_t version, int64_t now_s) {
   if (version < 6) {
     TF_RETURN_IF_ERROR(database.Execute(kVersion6));
     TF_RETURN_IF_ERROR(FillMeshesOfSessions(database));
+  }
+  if (version < 7) {
+    TF_RETURN_IF_ERROR(database.Execute(kVersion7));
+    TF_RETURN_IF_ERROR(OnSqlite(FillIndex)(database));
   }
   TF_RETURN_IF_ERROR(database.Execute(absl::StrCat("PRAGMA application_id=", kApplicationId,
                                                    ";PRAGMA user_version=", kSchemaVersion)));

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/sql_case_store.h"
 #include "server/store/sql_mesh_store.h"
 #include "server/store/sql_session_store.h"
@@ -43,7 +43,10 @@ class InMemoryCaseStore : private InMemoryBase, public SqlCaseStore {
 
 class InMemoryAccessStore : private InMemoryBase, public SqlAccessStore {
  public:
-  InMemoryAccessStore() : SqlAccessStore(database()) {}
+  InMemoryAccessStore() : SqlAccessStore(InMemoryBase::database()) {}
+
+  using InMemoryBase::database;
+  using InMemoryBase::stores;
 };
 
 }  // namespace tissueform

@@ -11,7 +11,8 @@ namespace tissueform::testing {
 // Who may what on a server where nobody logs in: everybody everything.
 struct NoLogins {
   InMemoryAccessStore store;
-  Access access;
+  AccessQueries queries{store.database()};
+  Access access{&queries};
   AccessChanges changes{{}, &store, &access};
 };
 

@@ -197,9 +197,13 @@ void CallScope::RenewFrom(const Authenticated& other) {
   }
 }
 
-absl::Status CallScope::IsStillAuthorized() const {
-  if (!may_end_early()) return absl::OkStatus();
-  return gate_->checks().authenticator->IsStillAuthorized(authenticated_);
+absl::Status CallScope::IsStillAuthorized() const { return AuthorizationQuestion()(); }
+
+std::function<absl::Status()> CallScope::AuthorizationQuestion() const {
+  if (!may_end_early()) return [] { return absl::OkStatus(); };
+  return [authenticator = gate_->checks().authenticator, authenticated = authenticated_] {
+    return authenticator->IsStillAuthorized(authenticated);
+  };
 }
 
 void CallScope::SetResource(std::string resource) {
@@ -251,6 +255,28 @@ grpc::ServerUnaryReactor* HandleUnaryCall(
   const absl::Status started = scope->admission().ok() ? start(*scope, end) : scope->admission();
   if (!started.ok()) end(started);
   return reactor;
+}
+
+grpc::ServerUnaryReactor* HandleUnaryCallIn(
+    Lane lane, WorkerPool* pool, grpc::CallbackServerContext* context, std::string_view method,
+    AdmissionControl* gate,
+    std::function<absl::Status(CallScope& scope, const FinishCall& end)> start) {
+  return HandleUnaryCall(context, method, gate, [&](CallScope& scope, const FinishCall& end) {
+    pool->Post(lane, [end, scope = &scope, start = std::move(start)] {
+      if (const absl::Status started = start(*scope, end); !started.ok()) end(started);
+    });
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* HandleStoreCall(grpc::CallbackServerContext* context,
+                                          std::string_view method, AdmissionControl* gate,
+                                          WorkerPool* pool,
+                                          std::function<absl::Status(CallScope* scope)> work) {
+  return HandleUnaryCall(context, method, gate, [&](CallScope& scope, const FinishCall& end) {
+    pool->Post(Lane::kStore, [end, scope = &scope, work = std::move(work)] { end(work(scope)); });
+    return absl::OkStatus();
+  });
 }
 
 }  // namespace tissueform

@@ -18,6 +18,7 @@
 #include "server/access/auth/authenticator.h"
 #include "server/rpc/calls/call_observer.h"
 #include "server/rpc/calls/call_quotas.h"
+#include "server/session/worker_pool.h"
 
 namespace tissueform {
 
@@ -113,6 +114,8 @@ class CallScope {
     return gate_ != nullptr && gate_->checks().authenticator != nullptr;
   }
   absl::Status IsStillAuthorized() const;
+  // The same as a function that needs no scope any more.
+  std::function<absl::Status()> AuthorizationQuestion() const;
 
   // Says what the call is about ("sessions/{id}"), once it is known that its caller may use it.
   void SetResource(std::string resource);
@@ -145,5 +148,18 @@ using FinishCall = std::function<void(const absl::Status& outcome)>;
 grpc::ServerUnaryReactor* HandleUnaryCall(
     grpc::CallbackServerContext* context, std::string_view method, AdmissionControl* gate,
     const std::function<absl::Status(CallScope& scope, const FinishCall& end)>& start);
+
+// The same, but `start` runs in the lane.
+grpc::ServerUnaryReactor* HandleUnaryCallIn(
+    Lane lane, WorkerPool* pool, grpc::CallbackServerContext* context, std::string_view method,
+    AdmissionControl* gate,
+    std::function<absl::Status(CallScope& scope, const FinishCall& end)> start);
+
+// The same for a call that waits for the store: `work` runs in Lane::kStore of `pool`, and its
+// status ends the call. `work` must not keep `scope`.
+grpc::ServerUnaryReactor* HandleStoreCall(grpc::CallbackServerContext* context,
+                                          std::string_view method, AdmissionControl* gate,
+                                          WorkerPool* pool,
+                                          std::function<absl::Status(CallScope* scope)> work);
 
 }  // namespace tissueform

@@ -10,7 +10,7 @@
 namespace tissueform {
 namespace {
 
-constexpr std::chrono::milliseconds kMaxPeek{2'000};
+constexpr std::chrono::milliseconds kBrief{2'000};
 
 PostgresPool::Idempotent IsIdempotent(const SqlJob& job) {
   return job.repeatable ? PostgresPool::Idempotent::kYes : PostgresPool::Idempotent::kNo;
@@ -24,7 +24,12 @@ PostgresDatabase::PostgresDatabase(PostgresPool* pool)
       jobs_((pool->options().max_connections + 1) / 2),
       peeks_((pool->options().max_connections + 1) / 2) {}
 
+PostgresPool::Clock::time_point PostgresDatabase::BriefDeadline() const {
+  return PostgresPool::Clock::now() + std::min(pool_->options().patience, kBrief);
+}
+
 absl::Status PostgresDatabase::Run(const SqlJob& job) {
+  if (job.brief) return pool_->Run(job.work, BriefDeadline(), IsIdempotent(job));
   return pool_->Run(job.work, IsIdempotent(job));
 }
 
@@ -36,7 +41,7 @@ void PostgresDatabase::Submit(const std::string& key, SqlJob job, StatusCallback
 }
 
 void PostgresDatabase::Peek(const std::string& key, SqlJob job, StatusCallback done) {
-  const auto deadline = PostgresPool::Clock::now() + std::min(pool_->options().patience, kMaxPeek);
+  const auto deadline = BriefDeadline();
   peeks_.Submit(key, [this, deadline, job = std::move(job), done = std::move(done)] {
     done(pool_->Run(job.work, deadline, IsIdempotent(job)));
   });

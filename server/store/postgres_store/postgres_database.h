@@ -28,6 +28,8 @@ class PostgresDatabase final : public SqlDatabase {
   const DurationHistogram* latency() const override { return &pool_->latency(); }
 
  private:
+  PostgresPool::Clock::time_point BriefDeadline() const;
+
   PostgresPool* const pool_;
   // Last: their jobs use the others.
   OrderedJobs jobs_;

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "server/store/store_index.h"
 
 namespace tissueform {
 namespace {
@@ -118,6 +119,48 @@ CREATE TABLE nodes (holder text PRIMARY KEY, name text COLLATE "C" NOT NULL,
 CREATE SEQUENCE session_epochs MINVALUE 2;
 )sql";
 
+constexpr char kVersion6[] = R"sql(
+ALTER TABLE sessions ADD COLUMN mesh_sha256 text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN project text COLLATE "C" NOT NULL DEFAULT '';
+CREATE INDEX sessions_by_mesh_sha256 ON sessions(mesh_sha256, owner);
+CREATE INDEX sessions_by_owner ON sessions(owner, project);
+ALTER TABLE predictions ALTER COLUMN session TYPE text COLLATE "C",
+  ADD COLUMN mesh_sha256 text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN bytes bigint NOT NULL DEFAULT 0;
+CREATE INDEX predictions_by_mesh_sha256 ON predictions(mesh_sha256, owner);
+CREATE INDEX predictions_by_owner ON predictions(owner, session);
+ALTER TABLE cases ADD COLUMN project text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN bytes bigint NOT NULL DEFAULT 0;
+CREATE INDEX cases_by_owner ON cases(owner, project);
+ALTER TABLE shares ADD COLUMN owner text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN resource text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN principal text COLLATE "C" NOT NULL DEFAULT '';
+CREATE INDEX shares_by_principal ON shares(principal, owner, resource);
+CREATE INDEX shares_by_resource ON shares(resource, owner);
+ALTER TABLE follow_links ADD COLUMN session text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN maker text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN expires_s bigint NOT NULL DEFAULT 0;
+CREATE INDEX follow_links_by_session ON follow_links(session);
+ALTER TABLE mesh_rights ADD COLUMN principal text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN sha256 text COLLATE "C" NOT NULL DEFAULT '',
+  ADD COLUMN bytes bigint NOT NULL DEFAULT 0;
+CREATE INDEX mesh_rights_by_principal ON mesh_rights(principal);
+CREATE INDEX mesh_rights_by_sha256 ON mesh_rights(sha256);
+)sql";
+
+// Servers ask for rights, cases and predictions when a call names them: their changes are told to
+// nobody.
+constexpr char kVersion7[] = R"sql(
+DROP TRIGGER IF EXISTS tell_created ON cases;
+DROP TRIGGER IF EXISTS tell_deleted ON cases;
+DROP TRIGGER IF EXISTS tell_created ON predictions;
+DROP TRIGGER IF EXISTS tell_deleted ON predictions;
+DROP TRIGGER IF EXISTS tell_changed ON shares;
+DROP TRIGGER IF EXISTS tell_changed ON follow_links;
+DROP TRIGGER IF EXISTS tell_changed ON mesh_rights;
+DROP FUNCTION IF EXISTS tissueform_tell_case();
+)sql";
+
 absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transaction) {
   TF_RETURN_IF_ERROR(transaction.TakeTurns(kTakeTurns));
   TF_ASSIGN_OR_RETURN(const int64_t version, PostgresSchemaVersion(transaction));
@@ -132,6 +175,11 @@ absl::Status ChangeSchema(const std::string& name, PostgresTransaction& transact
     TF_RETURN_IF_ERROR(transaction.Execute(kVersion5));
     TF_RETURN_IF_ERROR(RaiseSessionEpochs(transaction));
   }
+  if (version < 6) {
+    TF_RETURN_IF_ERROR(transaction.Execute(kVersion6));
+    TF_RETURN_IF_ERROR(FillIndex(transaction));
+  }
+  if (version < 7) TF_RETURN_IF_ERROR(transaction.Execute(kVersion7));
   return transaction.Run("UPDATE tissueform_version SET version = $1", {kPostgresSchemaVersion});
 }
 

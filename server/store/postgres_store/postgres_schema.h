@@ -29,7 +29,7 @@ namespace tissueform {
 // the channel `tissueform_changes` by triggers (change_listener.h).
 //
 // Names are compared byte by byte (COLLATE "C"), as everywhere else.
-inline constexpr int64_t kPostgresSchemaVersion = 5;
+inline constexpr int64_t kPostgresSchemaVersion = 7;
 
 // Makes the tables where there are none, or brings those of a version before up to date, in one
 // transaction; servers that start at once take turns.

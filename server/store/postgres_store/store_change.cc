@@ -14,25 +14,12 @@ StoreChange ParseStoreChange(const std::string& notice) {
       {"session_deleted", StoreChange::Kind::kSessionDeleted},
       {"session_changed", StoreChange::Kind::kSessionChanged},
       {"mesh_deleted", StoreChange::Kind::kMeshDeleted},
-      {"case_created", StoreChange::Kind::kCaseCreated},
-      {"case_deleted", StoreChange::Kind::kCaseDeleted},
-      {"prediction_created", StoreChange::Kind::kPredictionCreated},
-      {"prediction_deleted", StoreChange::Kind::kPredictionDeleted},
-      {"access_changed", StoreChange::Kind::kAccessChanged},
       {"exports_changed", StoreChange::Kind::kExportsChanged}};
   const size_t space = notice.find(' ');
   if (space == std::string::npos) return {};
   const auto found = kinds->find(notice.substr(0, space));
   if (found == kinds->end()) return {};
-  StoreChange change = {.kind = found->second, .name = notice.substr(space + 1)};
-  if (change.kind == StoreChange::Kind::kCaseCreated ||
-      change.kind == StoreChange::Kind::kCaseDeleted) {
-    const size_t end = change.name.find(' ');
-    if (end == std::string::npos) return {};
-    change.owner = change.name.substr(end + 1);
-    change.name.resize(end);
-  }
-  return change;
+  return {.kind = found->second, .name = notice.substr(space + 1)};
 }
 
 }  // namespace tissueform

@@ -15,24 +15,18 @@ struct StoreChange {
     kSessionDeleted,
     kSessionChanged,  // its record, not its poses
     kMeshDeleted,
-    kCaseCreated,
-    kCaseDeleted,
-    kPredictionCreated,
-    kPredictionDeleted,
-    kAccessChanged,  // shares, links or rights: no name; load them again
-    kExportsChanged,
-    kMissed,  // the connection was lost: anything may have changed
+    kExportsChanged,  // no name
+    kMissed,          // the connection was lost: anything may have changed
   };
 
   Kind kind = Kind::kMissed;
-  std::string name = {};   // id or SHA-256
-  std::string owner = {};  // of a case
+  std::string name = {};  // of a session or a mesh
 
   friend bool operator==(const StoreChange&, const StoreChange&) = default;
 };
 
-// A change as the triggers tell it ("session_deleted ID", "case_created SHA256 OWNER"). One that is
-// not known, which a newer server may tell, is kMissed.
+// A change as the triggers tell it ("session_deleted ID"). One that is not known, which a newer
+// server may tell, is kMissed.
 StoreChange ParseStoreChange(const std::string& notice);
 
 }  // namespace tissueform

@@ -143,6 +143,9 @@ TEST_F(ClusterAwayTest, WhatIsToBeKeptWaitsForADatabaseThatComesBack) {
 // Many more than there are threads: those that wait for one are not told later.
 TEST_F(ClusterAwayTest, OneThatDoesNotComeBackIsToldToAllPlainlyAndWhenTheirTimeIsOver) {
   Start(seconds(3));
+  RawDrag drag(a_, session_);
+  ASSERT_TRUE(drag.Send(1, /*commit=*/true));
+  ASSERT_TRUE(drag.WaitForCommit(1));
   GoAway();
   call_deadline_ = seconds(15);
   for (int i = 0; i < 16; ++i) BeginPrediction(i);
@@ -157,8 +160,7 @@ TEST_F(ClusterAwayTest, OneThatDoesNotComeBackIsToldToAllPlainlyAndWhenTheirTime
     v1::Share share;
     return FromGrpcStatus(a_.stubs->access->CreateShare(Context().get(), request, &share));
   });
-  RawDrag drag(a_, session_);
-  ASSERT_TRUE(drag.Send(1, /*commit=*/true));
+  ASSERT_TRUE(drag.Send(2, /*commit=*/true));
   for (auto& [name, call] : calls_) EXPECT_THAT(call.get(), SaysThatTheDatabaseIsAway()) << name;
   EXPECT_EQ(drag.NextCommitsFailure(),
             "the server's database does not answer; try again in a minute");

@@ -27,6 +27,7 @@ class StreamAuthorizationTest : public ::testing::Test {
     reached.get_future().wait();
   }
 
+  WorkerPool pool_{1};
   DeadlineTimer timer_;
   std::atomic<int> checks_ = 0;
 };
@@ -34,8 +35,13 @@ class StreamAuthorizationTest : public ::testing::Test {
 TEST_F(StreamAuthorizationTest, AsksUntilTheCallerMayNotGoOn) {
   std::promise<absl::Status> ended;
   StreamAuthorization authorization(
-      &timer_, kPeriod,
-      [&] { return ++checks_ < 3 ? absl::OkStatus() : absl::UnauthenticatedError("expired"); },
+      &timer_, &pool_, kPeriod,
+      [&] {
+        const bool expired = ++checks_ == 3;
+        return [expired] {
+          return expired ? absl::UnauthenticatedError("expired") : absl::OkStatus();
+        };
+      },
       [&](const absl::Status& status) { ended.set_value(status); });
   authorization.Start();
   EXPECT_THAT(ended.get_future().get(), StatusIs(absl::StatusCode::kUnauthenticated));
@@ -46,10 +52,10 @@ TEST_F(StreamAuthorizationTest, AsksUntilTheCallerMayNotGoOn) {
 
 TEST_F(StreamAuthorizationTest, AsksNothingOnceItHasStopped) {
   StreamAuthorization authorization(
-      &timer_, kPeriod,
+      &timer_, &pool_, kPeriod,
       [&] {
         ++checks_;
-        return absl::OkStatus();
+        return [] { return absl::OkStatus(); };
       },
       [](const absl::Status& /*status*/) { ADD_FAILURE(); });
   authorization.Start();
@@ -62,7 +68,7 @@ TEST_F(StreamAuthorizationTest, AsksNothingOnceItHasStopped) {
 
 TEST_F(StreamAuthorizationTest, StoppingEndsTheWaitForALongPeriod) {
   StreamAuthorization authorization(
-      &timer_, std::chrono::hours(1), [] { return absl::OkStatus(); },
+      &timer_, &pool_, std::chrono::hours(1), [] { return [] { return absl::OkStatus(); }; },
       [](const absl::Status& /*status*/) {});
   authorization.Stop();  // also before it has started
   authorization.Start();

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +14,8 @@
 #include "server/exports/export_store.h"
 #include "server/platform/storage/data_folder.h"
 #include "server/platform/storage/database.h"
+#include "server/store/access_queries.h"
+#include "server/store/access_rows.h"
 #include "server/store/durable_store.h"
 #include "server/store/store_records.h"
 #include "tests/server/store/store_samples.h"
@@ -127,6 +130,43 @@ TEST_F(OldFolderTest, AnExportWithoutAVersionBesideItIsChangedOnce) {
   ASSERT_THAT(exports.Put(record), IsOk());
   record.detail = "there";
   EXPECT_THAT(exports.Put(record), StatusIs(absl::StatusCode::kAborted));
+}
+
+TEST_F(OldFolderTest, RowsFromBeforeThereWereIndexColumnsAreFoundByThem) {
+  Copy(5, 17);
+  const std::string session = model_.sessions.begin()->first;
+  const ShareRow share = {.resource = absl::StrCat("sessions/", session),
+                          .owner = "planner",
+                          .principal = "bob",
+                          .role = ShareRole::kPlanner};
+  const FollowLinkRow link = {.digest = "d", .session = session, .maker = "bob", .expires_s = 9};
+  const MeshRight right = {.principal = "bob", .sha256 = "m", .bytes = 7};
+  {
+    ASSERT_OK_AND_ASSIGN(const auto database, Database::Open(path_ + "/tissueform.db"));
+    const auto insert = [&](const char* sql, const std::string& key, const std::string& row) {
+      const std::string sealed = Seal(row);
+      ASSERT_THAT(database->Prepare(sql).Bind(key).BindBytes(sealed).Run(), IsOk());
+    };
+    insert("INSERT INTO shares (name, record) VALUES (?, ?)", KeyOf(share), SerializeRow(share));
+    insert("INSERT INTO follow_links (name, record) VALUES (?, ?)", KeyOf(link),
+           SerializeRow(link));
+    insert("INSERT INTO mesh_rights (name, record) VALUES (?, ?)", KeyOf(right),
+           SerializeRow(right));
+  }
+  ASSERT_NO_FATAL_FAILURE(OpenAndCheck());
+  AccessQueries queries(&store_->database());
+  ASSERT_OK_AND_ASSIGN(const std::optional<LinkGrant> found, queries.FindLink("d"));
+  ASSERT_TRUE(found.has_value() && found->maker.has_value());
+  EXPECT_EQ(found->link, link);
+  EXPECT_EQ(found->maker->role, ShareRole::kPlanner);
+  ASSERT_OK_AND_ASSIGN(const SessionRecord record, GetSession(store_->sessions(), session));
+  EXPECT_EQ(found->maker->mesh_sha256, record.mesh_sha256);
+  EXPECT_EQ(queries.HoldingsOf("bob")->bytes, 7);
+  ASSERT_OK_AND_ASSIGN(const PredictionStore::Page page, store_->predictions().List({}));
+  ASSERT_FALSE(page.records.empty());
+  for (const PredictionRecord& prediction : page.records) {
+    EXPECT_TRUE(queries.PredictionsOfMesh(prediction.mesh_sha256)->contains(prediction.id));
+  }
 }
 
 }  // namespace

@@ -11,7 +11,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "server/store/access_store/sql_access_store.h"
+#include "server/exports/export_store.h"
+#include "server/store/sql_access_store.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/waiting_calls.h"
@@ -26,10 +27,8 @@ using Kind = StoreChange::Kind;
 TEST(StoreChangeTest, WhatIsNotKnownMeansThatAnythingMayHaveChanged) {
   EXPECT_EQ(ParseStoreChange("session_deleted a b"),
             (StoreChange{.kind = Kind::kSessionDeleted, .name = "a b"}));
-  EXPECT_EQ(ParseStoreChange("case_deleted 1a2b ann lee"),
-            (StoreChange{.kind = Kind::kCaseDeleted, .name = "1a2b", .owner = "ann lee"}));
-  EXPECT_EQ(ParseStoreChange("access_changed "), (StoreChange{.kind = Kind::kAccessChanged}));
-  for (const char* other : {"", "session_deleted", "fresh_thing x", "case_created 1a", " "}) {
+  EXPECT_EQ(ParseStoreChange("exports_changed "), (StoreChange{.kind = Kind::kExportsChanged}));
+  for (const char* other : {"", "session_deleted", "fresh_thing x", "access_changed ", " "}) {
     EXPECT_EQ(ParseStoreChange(other), (StoreChange{.kind = Kind::kMissed})) << other;
   }
 }
@@ -62,16 +61,17 @@ class ChangeListenerTest : public ::testing::Test {
   std::unique_ptr<ChangeListener> listener_;
 };
 
-TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndPosesAreNot) {
+TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndNothingElse) {
   ASSERT_OK_AND_ASSIGN(const SessionRecord record,
                        CreateSession(stores_->sessions(), SampleSession("s", 1)));
   ASSERT_THAT(UpdateSession(stores_->sessions(), record), IsOk());
   ASSERT_THAT(CommitPoses(stores_->sessions(), "s", SamplePoses(1)), IsOk());
   SqlAccessStore access(&stores_->database());
-  ASSERT_THAT(WaitFor<absl::Status>([&](auto done) {
-                access.Change({}, {.mesh_rights = {{.principal = "ann", .sha256 = "e"}}}, done);
-              }),
+  ASSERT_THAT(access.PutMeshRight({.principal = "ann", .sha256 = "e"}), IsOk());
+  ASSERT_THAT(access.PutLink({.digest = "d", .session = "s"}, /*now_s=*/-1, /*most=*/1), IsOk());
+  ASSERT_THAT(access.PutShare({.resource = "projects/p", .owner = "ann", .principal = "bob"}, 1),
               IsOk());
+  ASSERT_THAT(SqlExportStore(&stores_->database()).Put({.id = "e", .prediction = "p"}), IsOk());
   const std::string mesh = record.mesh_sha256;
   ASSERT_THAT(stores_->predictions().Create(SamplePrediction("p"), SamplePositions(1)), IsOk());
   ASSERT_THAT(stores_->predictions().Delete("p"), IsOk());
@@ -83,16 +83,11 @@ TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndPosesAreNot) {
   ASSERT_THAT(DeleteSession(stores_->sessions(), "s"), IsOk());
   ASSERT_THAT(stores_->meshes().Delete(mesh), IsOk());
   const StoreChange last = {.kind = Kind::kMeshDeleted, .name = mesh};
-  const std::vector<StoreChange> expected = {
-      {.kind = Kind::kSessionCreated, .name = "s"},
-      {.kind = Kind::kSessionChanged, .name = "s"},
-      {.kind = Kind::kAccessChanged},
-      {.kind = Kind::kPredictionCreated, .name = "p"},
-      {.kind = Kind::kPredictionDeleted, .name = "p"},
-      {.kind = Kind::kCaseCreated, .name = of_ann.sha256, .owner = "ann lee"},
-      {.kind = Kind::kCaseDeleted, .name = of_ann.sha256, .owner = "ann lee"},
-      {.kind = Kind::kSessionDeleted, .name = "s"},
-      last};
+  const std::vector<StoreChange> expected = {{.kind = Kind::kSessionCreated, .name = "s"},
+                                             {.kind = Kind::kSessionChanged, .name = "s"},
+                                             {.kind = Kind::kExportsChanged},
+                                             {.kind = Kind::kSessionDeleted, .name = "s"},
+                                             last};
   EXPECT_EQ(SeenUntil(last), expected);
 }
 

@@ -13,9 +13,10 @@
 
 #include "server/exports/export_store.h"
 #include "server/platform/storage/data_folder.h"
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/access_queries.h"
 #include "server/store/durable_store.h"
 #include "server/store/postgres_store/postgres_session_leases.h"
+#include "server/store/sql_access_store.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
 #include "tests/server/store/stores_case.h"
@@ -61,10 +62,7 @@ TEST_F(MigrateStoreTest, WhatOneServerHasKeptIsThereAsItWas) {
   theirs.owner = "another";
   ASSERT_THAT(KeepCase(from_->cases(), theirs, file), IsOk());
   const MeshRight right = {.principal = "ann", .sha256 = RecordOf(mesh).sha256, .bytes = 12};
-  ASSERT_THAT(WaitFor<absl::Status>([&](auto done) {
-                SqlAccessStore(&from_->database()).Change({}, {.mesh_rights = {right}}, done);
-              }),
-              IsOk());
+  ASSERT_THAT(SqlAccessStore(&from_->database()).PutMeshRight(right), IsOk());
   ASSERT_THAT(SqlExportStore(&from_->database()).Put({.id = "e", .prediction = "p"}), IsOk());
 
   ASSERT_OK_AND_ASSIGN(const MigrationSummary summary, MigrateStore(from_.get(), to_.get()));
@@ -92,8 +90,9 @@ TEST_F(MigrateStoreTest, WhatOneServerHasKeptIsThereAsItWas) {
   EXPECT_THAT(cases.records, SizeIs(2));
   ASSERT_OK_AND_ASSIGN(const std::string read, ReadWholeCase(to_->cases(), mine.sha256));
   EXPECT_EQ(read, file);
-  ASSERT_OK_AND_ASSIGN(const AccessRows access, SqlAccessStore(&to_->database()).Load());
-  EXPECT_THAT(access.mesh_rights, ElementsAre(right));
+  AccessQueries access(&to_->database());
+  EXPECT_THAT(access.FindMeshUse(right.sha256)->senders, ElementsAre("ann"));
+  EXPECT_EQ(access.HoldingsOf("ann")->bytes, 12);
   EXPECT_THAT(*SqlExportStore(&to_->database()).Load(), SizeIs(1));
 }
 

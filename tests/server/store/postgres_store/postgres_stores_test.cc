@@ -7,6 +7,7 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -19,9 +20,10 @@
 #include "core/base/error_reason.h"
 #include "server/exports/export_queue.h"
 #include "server/exports/export_store.h"
-#include "server/store/access_store/sql_access_store.h"
+#include "server/store/access_queries.h"
 #include "server/store/postgres_store/postgres_blobs.h"
 #include "server/store/postgres_store/postgres_schema.h"
+#include "server/store/sql_access_store.h"
 #include "server/store/store_errors.h"
 #include "tests/server/store/postgres_store/test_database.h"
 #include "tests/server/store/store_samples.h"
@@ -230,10 +232,35 @@ TEST_F(PostgresStoresTest, TablesOfANewerServerAreLeftAlone) {
                                                         HasSubstr("another database"))));
 }
 
+// What version 6 has added.
+constexpr char kDropIndexColumns[] =
+    "ALTER TABLE sessions DROP COLUMN mesh_sha256, DROP COLUMN project;"
+    "ALTER TABLE predictions DROP COLUMN mesh_sha256, DROP COLUMN bytes;"
+    "DROP INDEX predictions_by_owner;"
+    "ALTER TABLE cases DROP COLUMN project, DROP COLUMN bytes;"
+    "ALTER TABLE shares DROP COLUMN owner, DROP COLUMN resource, DROP COLUMN principal;"
+    "ALTER TABLE follow_links DROP COLUMN session, DROP COLUMN maker, DROP COLUMN expires_s;"
+    "ALTER TABLE mesh_rights DROP COLUMN principal, DROP COLUMN sha256, DROP COLUMN bytes;";
+
+TEST_F(PostgresStoresTest, RowsFromBeforeThereWereIndexColumnsAreFoundByThem) {
+  ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), 7), IsOk());
+  const ShareRow share = {.resource = "projects/project 1", .owner = "planner", .principal = "bob"};
+  ASSERT_THAT(SqlAccessStore(&stores_->database()).PutShare(share, /*most=*/1), IsOk());
+  stores_.reset();
+  RunSql(absl::StrCat(kDropIndexColumns, "UPDATE tissueform_version SET version = 5;"));
+  stores_ = OpenTestStores();
+  AccessQueries queries(&stores_->database());
+  ASSERT_OK_AND_ASSIGN(const std::optional<SessionGrant> found, queries.FindSession("s", "bob"));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->role, ShareRole::kViewer);
+  EXPECT_EQ(found->mesh_sha256, SampleSession("s", 1).mesh_sha256);
+}
+
 TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatTheyHold) {
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), 7), IsOk());
   const std::string mesh = PutMesh(1);
   stores_.reset();
+  RunSql(kDropIndexColumns);
   RunSql(
       "DROP TABLE exports, nodes; DROP SEQUENCE session_epochs; UPDATE tissueform_version SET "
       "version = 4;");

@@ -4,13 +4,12 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
-#include <vector>
 
 #include "absl/status/status.h"
-#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
+// Rows that decide who may do what, by key, and as bytes (tissueform.store.v1).
 namespace tissueform {
 
 // What somebody may do with another's resource. Each may all that the ones before may.
@@ -47,26 +46,18 @@ struct MeshRight {
   friend bool operator==(const MeshRight&, const MeshRight&) = default;
 };
 
-struct AccessRows {
-  std::vector<ShareRow> shares = {};
-  std::vector<FollowLinkRow> links = {};
-  std::vector<MeshRight> mesh_rights = {};
-};
+// One a row; names hold no line feed.
+std::string KeyOf(const ShareRow& row);
+std::string KeyOf(const FollowLinkRow& row);
+std::string KeyOf(const MeshRight& row);
 
-// Where it is kept who may do what with whose. tests/server/store/access_store holds the contract.
-//
-// Thread-safe.
-class AccessStore {
- public:
-  virtual ~AccessStore() = default;
+std::string SerializeRow(const ShareRow& row);
+std::string SerializeRow(const FollowLinkRow& row);
+std::string SerializeRow(const MeshRight& row);
 
-  // All rows, of each kind by its key, rising. Damaged ones are passed over: nobody may more by
-  // damage. Blocks. Errors: what the disk says.
-  virtual absl::StatusOr<AccessRows> Load() = 0;
-
-  // Takes rows out by their keys, then puts rows in, in place of those with their keys; all or
-  // nothing. `done` when that is as durable as the store is: once, on any thread; it may not block.
-  virtual void Change(AccessRows erase, AccessRows put, std::function<void(absl::Status)> done) = 0;
-};
+// Errors: DataLoss, for bytes that are no such row.
+absl::Status ParseRow(absl::string_view bytes, ShareRow* row);
+absl::Status ParseRow(absl::string_view bytes, FollowLinkRow* row);
+absl::Status ParseRow(absl::string_view bytes, MeshRight* row);
 
 }  // namespace tissueform

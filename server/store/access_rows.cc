@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "server/store/access_store/access_rows.h"
+#include "server/store/access_rows.h"
 
 #include "absl/strings/str_cat.h"
 
