@@ -13,6 +13,9 @@ namespace tissueform {
 namespace {
 
 constexpr double kAirHu = -1000;
+// Between hair, which a CT blurs into the air about it, and fat (-100) with the dark streaks that
+// metal throws.
+constexpr double kSkinHu = -300;
 // A hit so near to voxels of the cut lies on their faces, not on skin.
 constexpr double kAtCutVoxels = 1.2;
 
@@ -21,7 +24,6 @@ class FrontRays {
  public:
   FrontRays(const HeadSegmentation& head, const FaceAxes& axes, const ReliefExtent& extent)
       : hu_(head.hu),
-        threshold_hu_(head.options.tissue_above_hu),
         to_cut_(head.cut.values.empty() ? FloatGrid() : DistanceMm(head.cut)),
         axes_(axes),
         extent_(extent) {}
@@ -34,9 +36,9 @@ class FrontRays {
       const double front = extent_.foremost_mm - step * step_mm;
       const Eigen::Vector3d place = axes_.Place({left, front, up});
       const double hu = IsInside(place) ? Interpolate(hu_, place) : kAirHu;
-      if (hu > threshold_hu_) {
+      if (hu > kSkinHu) {
         if (IsAtCut(place)) return std::numeric_limits<double>::quiet_NaN();
-        return front + step_mm * (hu - threshold_hu_) / (hu - before_hu);
+        return front + step_mm * (hu - kSkinHu) / (hu - before_hu);
       }
       before_hu = hu;
     }
@@ -57,7 +59,6 @@ class FrontRays {
   }
 
   const HuGrid& hu_;
-  double threshold_hu_;
   FloatGrid to_cut_;
   FaceAxes axes_;
   ReliefExtent extent_;

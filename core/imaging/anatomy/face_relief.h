@@ -36,7 +36,8 @@ struct ReliefExtent {
   double depth_mm = 0;     // and how far they go
 };
 
-// The skin is the CT's isosurface at the threshold of the segmentation, true to a part of a voxel.
+// The skin is the CT's isosurface at -300 HU, true to a part of a voxel: a beard or a moustache is
+// not skin. It lies some tenths of a millimeter behind the model's skin (-500 HU).
 FaceRelief MeasureFaceRelief(const HeadSegmentation& head, const FaceAxes& axes,
                              const ReliefExtent& extent);
 

@@ -32,6 +32,8 @@ constexpr double kNarrowestGapMm = 4;
 // Deeper than that behind the lips, it does not matter what a ray meets: teeth, tongue or throat.
 constexpr double kInMouthMm = 11;
 constexpr double kFallenJawMm = 30;
+// The nose begins 17 mm or more over the start, which is 20 to 25 mm over the edges of the
+// incisors.
 constexpr double kBelowNoseMm = 12;
 
 // A step of a millimeter is worth as much as so much notch; steeper than 45 degrees no mouth is.
@@ -41,10 +43,15 @@ constexpr int kMaxStepRows = 2;
 // Hairs and the CT's noise differ between columns; lips do not differ by more than that.
 constexpr double kSameSkinMm = 3;
 
-// The narrowest half of a mouth. A shallow place nearer to the midline is a hair or a scar, and a
-// narrower one farther out, too.
-constexpr double kNarrowestHalfMm = 15;
-constexpr double kShallowStretchMm = 3;
+// Adult mouths are 40 to 60 mm wide. A notch that ends nearer to the midline than half of the
+// narrowest is hidden by hair or too shallow to see; its corner is put at half of the usual width.
+constexpr double kNarrowestHalfMm = 20;
+constexpr double kUsualHalfMm = 25;
+// Single hairs, scars and the CT's noise are narrower than the median over 2 mm to either side.
+constexpr Index kSmoothColumns = 2;
+// A breathing tube is 10 to 13 mm thick: a lip that is hidden within half of that of the end of a
+// notch may hide the true end.
+constexpr double kHalfTubeMm = 6;
 
 constexpr double kOverIncisorMm = 3;
 constexpr double kEnamelHu = 1400;  // bone of a ridge without teeth stays below
@@ -92,10 +99,11 @@ class LipColumn {
  public:
   LipColumn(const FaceRelief& relief, Index column, double start_up)
       : relief_(relief), column_(column) {
-    foremost_ = Foremost(RowAt(start_up - kFallenJawMm), RowAt(start_up + kBelowNoseMm));
-    FindGap(RowAt(start_up - kFallenJawMm), RowAt(start_up - kMouthLineSearchMm),
-            RowAt(start_up + kMouthLineSearchMm));
+    const Index fallen = RowAt(start_up - kFallenJawMm);
     notch_low_ = RowAt(start_up - kMouthLineSearchMm);
+    below_nose_ = RowAt(start_up + kBelowNoseMm);
+    foremost_ = Foremost(fallen, below_nose_);
+    FindGap(fallen, RowAt(start_up + kMouthLineSearchMm));
   }
 
   Index RowAt(double up) const {
@@ -107,8 +115,10 @@ class LipColumn {
   Notch At(Index row) const {
     if (std::isnan(Front(row)) || !std::isfinite(foremost_)) return {};
     if (column_seen_ == Seen::kGap) return {Seen::kGap, 0};
-    if (column_seen_ == Seen::kUntold || !std::isfinite(Front(row))) return {Seen::kUntold, 0};
-    return {Seen::kSkin, BelowChord(row)};
+    const double depth_mm = BelowChord(row);
+    // False for infinities, too.
+    const bool is_skin = column_seen_ == Seen::kSkin && depth_mm < kInMouthMm;
+    return is_skin ? Notch{Seen::kSkin, depth_mm} : Notch{Seen::kUntold, 0};
   }
   // What a path is worth that goes through a row.
   double GainAt(Index row) const {
@@ -118,18 +128,21 @@ class LipColumn {
     }
     return row < notch_low_ ? 0 : std::min(notch.depth_mm, kDeepNotchMm);
   }
-  // The point of the line at a row, on the skin as measured; at a gap, midway between its edges.
+  // The point of the line at a row, on the skin as measured; at a gap, midway between its edges and
+  // no farther back than the lips.
   MouthLinePoint PointAt(Index row, const FaceRelief& measured) const {
+    const Notch notch = At(row);
     MouthLinePoint point;
     point.at = {relief_.LeftOf(column_), measured.front_mm(row, column_), relief_.UpOf(row)};
-    const Notch notch = At(row);
     point.notch_mm = notch.depth_mm;
     point.parted = notch.seen == Seen::kGap;
-    if (!std::isfinite(point.at.front)) point.at.front = NearestFront(row);
-    if (!point.parted) return point;
-    point.at.up = relief_.bottom_mm + gap_middle() * relief_.row_mm;
-    point.at.front = std::min(FrontAbove(static_cast<Index>(std::floor(gap_high_))),
-                              FrontBelow(static_cast<Index>(std::ceil(gap_low_))));
+    if (point.parted) {
+      point.at.up = relief_.bottom_mm + gap_middle() * relief_.row_mm;
+      point.at.front = LipsFront(static_cast<Index>(std::ceil(gap_low_)),
+                                 static_cast<Index>(std::floor(gap_high_)));
+    } else if (notch.seen != Seen::kSkin) {
+      point.at.front = LipsFront(row, row);
+    }
     return point;
   }
 
@@ -169,23 +182,34 @@ class LipColumn {
     }
     return static_cast<double>(low + high) / 2;
   }
-  // The upper lip ends within the rows of the search; the lower one begins at any depth below.
-  void FindGap(Index fallen, Index low, Index high) {
-    lip_floor_ = Foremost(low, high + LipRows()) - kInMouthMm;
-    const Edge upper = SteepestEdge(low, high, 1);
+  // The upper lip ends within the rows of the search; the lower one begins above `fallen`.
+  void FindGap(Index fallen, Index high) {
+    lip_floor_ = Foremost(notch_low_, below_nose_) - kInMouthMm;
+    const Edge upper = SteepestEdge(notch_low_, high, 1);
     if (upper.rise_mm < kLipEdgeMm) return;
     const Edge lower = SteepestEdge(fallen, static_cast<Index>(upper.row), -1);
     gap_low_ = lower.row;
     gap_high_ = upper.row;
     const bool is_told = lower.rise_mm >= kLipEdgeMm;
-    const bool is_closed = is_told && gap_high_ - gap_low_ < kNarrowestGapMm / relief_.row_mm;
+    const bool is_closed = is_told ? gap_high_ - gap_low_ < kNarrowestGapMm / relief_.row_mm
+                                   : IsClosedBelow(static_cast<Index>(upper.row));
     if (is_closed) return;
     column_seen_ = is_told ? Seen::kGap : Seen::kUntold;
+  }
+  // Whether the notch under an upper lip's edge is that of lips that touch, as where the upper one
+  // overhangs: it is not deep, and under it the skin comes forward again.
+  bool IsClosedBelow(Index edge) const {
+    Index bottom = edge;
+    for (Index row = std::max<Index>(edge - LipRows(), 0); row <= edge; ++row) {
+      if (!(BelowChord(row) < kDeepNotchMm)) return false;
+      if (Front(row) < Front(bottom)) bottom = row;
+    }
+    return Foremost(bottom - LipRows(), bottom) - Front(bottom) >= kShallowNotchMm;
   }
 
   // How far the skin lies behind the chord from the front of the lip above to the one below.
   double BelowChord(Index row) const {
-    const Index above = ForemostRow(row, row + LipRows());
+    const Index above = ForemostRow(row, std::min(row + LipRows(), below_nose_));
     const Index below = ForemostRow(row - LipRows(), row);
     if (above == row || below == row) return 0;
     const double share = static_cast<double>(row - below) / static_cast<double>(above - below);
@@ -205,8 +229,11 @@ class LipColumn {
     return std::isfinite(front) ? front : -std::numeric_limits<double>::infinity();
   }
   Index LipRows() const { return RowsOf(kLipHeightMm); }
-  double FrontAbove(Index row) const { return Foremost(row, row + LipRows()); }
-  double FrontBelow(Index row) const { return Foremost(row - LipRows(), row); }
+  // Of the lip farther back; of the nearest skin where a lip is not seen.
+  double LipsFront(Index low, Index high) const {
+    const double front = std::min(Foremost(low - LipRows(), low), Foremost(high, high + LipRows()));
+    return std::isfinite(front) ? front : NearestFront(low);
+  }
   double NearestFront(Index row) const {
     for (Index away = 1; away < relief_.front_mm.rows(); ++away) {
       const double front = Foremost(row - away, row + away);
@@ -219,6 +246,7 @@ class LipColumn {
   Index column_;
   double foremost_ = 0;
   Index notch_low_ = 0;
+  Index below_nose_ = 0;
   Seen column_seen_ = Seen::kSkin;
   double lip_floor_ = 0;
   double gap_low_ = 0;  // rows of the edges of the lips
@@ -277,18 +305,38 @@ bool IsMouth(const MouthLinePoint& point) {
   return point.parted || point.notch_mm >= kShallowNotchMm;
 }
 
-// Columns with an untold one so near that it blurs where a notch ends.
-std::vector<bool> NearUntold(const std::vector<LipColumn>& columns,
-                             const std::vector<Index>& rows) {
-  const auto reach = static_cast<size_t>(2 * kShallowStretchMm);
-  std::vector<bool> near(columns.size());
-  for (size_t i = 0; i < columns.size(); ++i) {
-    if (columns[i].At(rows[i]).seen != Seen::kUntold) continue;
-    const size_t first = i < reach ? 0 : i - reach;
-    const size_t last = std::min(i + reach, columns.size() - 1);
-    for (size_t other = first; other <= last; ++other) near[other] = true;
+// A point of one half of the line.
+struct HalfPoint {
+  size_t index = 0;
+  double out_mm = 0;    // from the midline
+  double notch_mm = 0;  // smoothed along the line; parted lips count as deep
+  Seen seen = Seen::kNothing;
+};
+using HalfLine = std::vector<HalfPoint>;  // from the midline outwards
+
+double SmoothNotch(const std::vector<MouthLinePoint>& points, size_t index) {
+  const auto middle = static_cast<Index>(index);
+  const Index last = std::min(middle + kSmoothColumns, static_cast<Index>(points.size()) - 1);
+  std::vector<double> depths;
+  for (Index i = std::max<Index>(middle - kSmoothColumns, 0); i <= last; ++i) {
+    const MouthLinePoint& point = points[static_cast<size_t>(i)];
+    depths.push_back(point.parted ? kDeepNotchMm : point.notch_mm);
   }
-  return near;
+  const auto median = depths.begin() + static_cast<Index>(depths.size() / 2);
+  std::nth_element(depths.begin(), median, depths.end());
+  return *median;
+}
+
+// The half to the left for `side` +1, to the right for -1.
+HalfLine HalfOf(const std::vector<MouthLinePoint>& points, const std::vector<Seen>& seen,
+                int side) {
+  HalfLine half;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (side * points[i].at.left < 0) continue;
+    half.push_back({i, std::abs(points[i].at.left), SmoothNotch(points, i), seen[i]});
+  }
+  if (side < 0) std::reverse(half.begin(), half.end());
+  return half;
 }
 
 struct CornerFound {
@@ -296,31 +344,38 @@ struct CornerFound {
   MouthCornerReason reason = MouthCornerReason::kCapped;
 };
 
-// From the midline outwards, by `step` of +1 or -1. `is_seen` says at which points there is skin.
-CornerFound FindCorner(const std::vector<MouthLinePoint>& points, const std::vector<bool>& is_seen,
-                       const std::vector<bool>& is_untold, size_t middle, int step) {
-  CornerFound corner{.index = middle};
-  for (size_t i = middle; i < points.size(); i += static_cast<size_t>(step)) {
-    const double out_mm = std::abs(points[i].at.left);
-    if (!is_seen[i]) return {corner.index, MouthCornerReason::kSkinNotSeen};
-    const double shallow_mm = out_mm - std::abs(points[corner.index].at.left);
-    if (IsMouth(points[i]) || out_mm <= kNarrowestHalfMm) corner.index = i;
-    if (shallow_mm < kShallowStretchMm) continue;
-    const bool is_notch = IsMouth(points[corner.index]) &&
-                          std::abs(points[corner.index].at.left) > kNarrowestHalfMm &&
-                          !is_untold[i];
-    return {corner.index, is_notch ? MouthCornerReason::kNotchEnds : MouthCornerReason::kNoNotch};
-  }
-  // The last shallow points before the cap are no corner: the notch may go on behind them.
-  corner.index = step > 0 ? points.size() - 1 : 0;
-  return corner;
+// Whether the notch of `half` ends before `end` beyond doubt.
+bool EndsClearly(const HalfLine& half, HalfLine::const_iterator end) {
+  const HalfPoint& corner = *std::prev(end);
+  const bool is_hidden = std::any_of(half.begin(), half.end(), [&](const HalfPoint& point) {
+    return point.seen == Seen::kUntold && std::abs(point.out_mm - corner.out_mm) < kHalfTubeMm;
+  });
+  const auto deep = std::count_if(
+      half.begin(), end, [](const HalfPoint& point) { return point.notch_mm >= kShallowNotchMm; });
+  return corner.out_mm >= kNarrowestHalfMm && !is_hidden &&
+         static_cast<double>(deep) >= kSureShare * static_cast<double>(end - half.begin());
 }
 
-void KeepBetweenCorners(const std::vector<bool>& is_seen, const std::vector<bool>& is_untold,
-                        MouthLine* line) {
-  const size_t middle = line->points.size() / 2;
-  const CornerFound right = FindCorner(line->points, is_seen, is_untold, middle, -1);
-  const CornerFound left = FindCorner(line->points, is_seen, is_untold, middle, 1);
+CornerFound FindCorner(const HalfLine& half) {
+  const auto unseen = std::find_if(half.begin(), half.end(), [](const HalfPoint& point) {
+    return point.seen == Seen::kNothing;
+  });
+  const auto cut_reason =
+      unseen == half.end() ? MouthCornerReason::kCapped : MouthCornerReason::kSkinNotSeen;
+  const auto end = std::find_if(half.begin(), unseen, [](const HalfPoint& point) {
+    return point.out_mm >= kNarrowestHalfMm && point.notch_mm < kShallowNotchMm;
+  });
+  if (end == unseen) return {std::prev(unseen)->index, cut_reason};
+  if (EndsClearly(half, end)) return {std::prev(end)->index, MouthCornerReason::kNotchEnds};
+  const auto usual = std::find_if(
+      half.begin(), unseen, [](const HalfPoint& point) { return point.out_mm >= kUsualHalfMm; });
+  if (usual == unseen) return {std::prev(unseen)->index, cut_reason};
+  return {usual->index, MouthCornerReason::kNoNotch};
+}
+
+void KeepBetweenCorners(const std::vector<Seen>& seen, MouthLine* line) {
+  const CornerFound right = FindCorner(HalfOf(line->points, seen, -1));
+  const CornerFound left = FindCorner(HalfOf(line->points, seen, 1));
   line->right_corner = right.reason;
   line->left_corner = left.reason;
   const auto first = line->points.begin();
@@ -366,8 +421,8 @@ std::string DescribeCorner(const char* side, MouthCornerReason reason, double ou
           side, out_mm);
     case MouthCornerReason::kNoNotch:
       return absl::StrFormat(
-          "The %s corner of the mouth is unsure: the skin shows no clear end of the notch; the "
-          "corner was put %.0f mm from the midline.",
+          "The %s corner of the mouth is unsure: the skin shows no clear end of the notch between "
+          "the lips, so the corner was put %.0f mm from the midline, as in most adults.",
           side, out_mm);
     case MouthCornerReason::kCapped:
       return absl::StrFormat(
@@ -406,15 +461,15 @@ absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& measured, double start
   const std::vector<Index> rows = PathSearch(columns, low, num_rows, relief.row_mm).Run();
   MouthLine line;
   line.start_up = start_up;
-  std::vector<bool> is_seen;
+  std::vector<Seen> seen;
   for (size_t i = 0; i < columns.size(); ++i) {
-    is_seen.push_back(columns[i].At(rows[i]).seen != Seen::kNothing);
+    seen.push_back(columns[i].At(rows[i]).seen);
     line.points.push_back(columns[i].PointAt(rows[i], measured));
   }
-  if (!is_seen[columns.size() / 2]) {
+  if (seen[columns.size() / 2] == Seen::kNothing) {
     return absl::InvalidArgumentError("the skin of the mouth is not in view");
   }
-  KeepBetweenCorners(is_seen, NearUntold(columns, rows), &line);
+  KeepBetweenCorners(seen, &line);
   return line;
 }
 

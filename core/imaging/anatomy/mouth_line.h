@@ -18,7 +18,7 @@ namespace tissueform {
 
 // Limits of an adult mouth, in mm. `left` and `up` are face coordinates (FaceAxes).
 inline constexpr double kMouthLineSearchMm = 9;  // above and below the start
-inline constexpr double kShallowNotchMm = 1.5;   // less is not a mouth
+inline constexpr double kShallowNotchMm = 1.5;   // less is not told from folds of the skin
 inline constexpr double kMouthHalfWidthCapMm = 30;
 
 // What the height is measured from at which the search begins.
@@ -30,8 +30,8 @@ enum class MouthStart {
 // Why the line ends at a corner.
 enum class MouthCornerReason {
   kNotchEnds,    // the notch becomes shallower than 1.5 mm
-  kNoNotch,      // no notch 15 mm from the midline, where every mouth has one, or it ends unseen:
-                 // unsure
+  kNoNotch,      // no notch 20 mm from the midline, where every adult mouth has one, or too little
+                 // of it is seen on that side: the corner is put 25 mm from the midline: unsure
   kCapped,       // the notch goes on; the corner is put 30 mm from the midline: unsure
   kSkinNotSeen,  // the CT does not show the skin farther out: unsure
 };
@@ -61,7 +61,7 @@ struct MouthLine {
 
 // The line on a relief, by dynamic programming over its columns: the path within 9 mm of
 // `start_up` with the deepest notch and few steps. Parted lips are followed midway between their
-// edges, at any height.
+// edges; the upper one ends within those 9 mm, the lower one begins at most 30 mm below the start.
 //
 // Errors: InvalidArgument when the relief shows no skin in the midline within those 9 mm.
 absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& relief, double start_up);

@@ -67,13 +67,14 @@ TEST(MouthLineTest, ANotchOutOfReachIsNotTaken) {
 }
 
 TEST(MouthLineTest, PartedLipsHaveTheirLineMidwayBetweenTheirEdges) {
-  FaceRelief relief = GroovedFace(24, [](double) { return 0; });
-  // Air from 8 mm below the start to 2 mm over it.
+  FaceRelief relief = GroovedFace(24, [](double) { return -3; });
+  // Air from 8 mm below the start to 2 mm over it. The groove is within: what is left of one on a
+  // single edge would round that edge, and move the line.
   relief.front_mm.block(64, 25, 21, 21) = -std::numeric_limits<double>::infinity();
   ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
   const MouthLinePoint& middle = line.points[line.points.size() / 2];
   EXPECT_TRUE(middle.parted);
-  EXPECT_NEAR(middle.at.up, -3, 0.05);
+  EXPECT_EQ(middle.at.up, -3);
   EXPECT_EQ(middle.at.front, 60);
 }
 
@@ -109,11 +110,73 @@ TEST(MouthLineTest, AColumnWithOneLipEdgeIsUnsure) {
   EXPECT_NE(line.left_corner, MouthCornerReason::kNotchEnds);
 }
 
-TEST(MouthLineTest, ACornerTooNearToTheMidlineIsUnsure) {
+TEST(MouthLineTest, ACornerTooNearToTheMidlineIsUnsureAndPutWhereMostAdultsHaveIt) {
   ASSERT_OK_AND_ASSIGN(const MouthLine line,
-                       FindMouthLine(GroovedFace(12, [](double) { return 0; }), 0));
+                       FindMouthLine(GroovedFace(18, [](double) { return 0; }), 0));
   EXPECT_EQ(line.left_corner, MouthCornerReason::kNoNotch);
+  EXPECT_EQ(line.points.back().at.left, 25);
   EXPECT_THAT(DescribeMouthLine(line)[2], HasSubstr("unsure"));
+}
+
+// A hair hides the notch in two columns; a scar deepens the skin behind its end in two.
+TEST(MouthLineTest, NarrowDisturbancesDoNotMoveACorner) {
+  FaceRelief relief = GroovedFace(23, [](double) { return 0; });
+  relief.front_mm.block(0, 35 + 21, 121, 2) = 60;
+  relief.front_mm.block(76, 35 + 26, 9, 2) = 55;
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
+  EXPECT_EQ(line.left_corner, MouthCornerReason::kNotchEnds);
+  EXPECT_NEAR(line.points.back().at.left, 23, 2);
+}
+
+// A moustache hides the notch from 8 to 17 mm and ends by a step at 24 mm, as if it were a corner.
+TEST(MouthLineTest, ACornerIsUnsureWhereLittleOfItsHalfIsSeen) {
+  FaceRelief relief = GroovedFace(24, [](double) { return 0; });
+  relief.front_mm.block(0, 35 + 8, 121, 10) = 60;
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
+  EXPECT_EQ(line.left_corner, MouthCornerReason::kNoNotch);
+  EXPECT_EQ(line.right_corner, MouthCornerReason::kNotchEnds);
+}
+
+// The upper lip ends by a step of 4 mm over the lower one, which comes forward by 2 mm again.
+TEST(MouthLineTest, ClosedLipsOfWhichTheUpperOneOverhangsAreFound) {
+  FaceRelief relief = GroovedFace(0.5, [](double) { return 100; });
+  for (Eigen::Index row = 0; row <= 80; ++row) {
+    const double below_mm = -relief.UpOf(row);
+    relief.front_mm.block(row, 35 - 24, 1, 49) = 56 + std::min(below_mm / 2, 2.0);
+  }
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
+  EXPECT_TRUE(line.line_is_sure());
+  EXPECT_EQ(line.parted_share, 0);
+  EXPECT_EQ(line.points[line.points.size() / 2].at.up, 0);
+  EXPECT_EQ(line.left_corner, MouthCornerReason::kNotchEnds);
+  EXPECT_NEAR(line.points.back().at.left, 24, 1);
+}
+
+// A hole in the lips, as a removed tube leaves it, shows tissue 20 mm behind them.
+TEST(MouthLineTest, WhatLiesDeepInTheMouthIsNotSkin) {
+  FaceRelief relief = GroovedFace(24, [](double) { return 0; });
+  relief.front_mm.block(76, 35 - 4, 9, 9) = 40;
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
+  const MouthLinePoint& middle = line.points[static_cast<size_t>(-line.points.front().at.left)];
+  EXPECT_GT(middle.at.front, 56);
+  EXPECT_LT(middle.notch_mm, kShallowNotchMm);
+}
+
+// A nose from 13 mm over the line on, 10 mm before the lips and cut off after 5 mm. The edge under
+// it is steeper than the notch between the lips, and within a lip's height of the rows of the
+// search.
+TEST(MouthLineTest, ACutOffNoseDoesNotMoveTheLine) {
+  const auto up_of = [](double /*left*/) { return 0; };
+  FaceRelief relief = GroovedFace(24, up_of);
+  relief.front_mm.block(80 + 26, 35 - 15, 10, 31) = 70;
+  relief.front_mm.block(80 + 36, 35 - 15, 5, 31) = std::numeric_limits<double>::quiet_NaN();
+  ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));
+  ASSERT_OK_AND_ASSIGN(const MouthLine whole, FindMouthLine(GroovedFace(24, up_of), 0));
+  ASSERT_EQ(line.points.size(), whole.points.size());
+  for (size_t i = 0; i < line.points.size(); ++i) {
+    EXPECT_EQ(line.points[i].at.up, whole.points[i].at.up) << line.points[i].at.left;
+  }
+  EXPECT_TRUE(line.line_is_sure());
 }
 
 TEST(MouthLineTest, SkinThatIsNotSeenEndsTheLine) {
