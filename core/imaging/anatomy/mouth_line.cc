@@ -301,10 +301,6 @@ class PathSearch {
   Eigen::ArrayXd best_;
 };
 
-bool IsMouth(const MouthLinePoint& point) {
-  return point.parted || point.notch_mm >= kShallowNotchMm;
-}
-
 // A point of one half of the line.
 struct HalfPoint {
   size_t index = 0;
@@ -385,7 +381,7 @@ void KeepBetweenCorners(const std::vector<Seen>& seen, MouthLine* line) {
     const auto count = std::count_if(line->points.begin(), line->points.end(), counts);
     return static_cast<double>(count) / static_cast<double>(line->points.size());
   };
-  line->seen_share = share(IsMouth);
+  line->seen_share = share([](const MouthLinePoint& point) { return point.seen(); });
   line->parted_share = share([](const MouthLinePoint& point) { return point.parted; });
 }
 

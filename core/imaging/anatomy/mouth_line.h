@@ -40,6 +40,9 @@ struct MouthLinePoint {
   FaceCoordinates at;
   double notch_mm = 0;  // how far behind the chord between the two lips' fronts; 0 where parted
   bool parted = false;  // air parts the lips: the point lies midway between their edges
+
+  // Whether the CT shows lips there.
+  bool seen() const { return parted || notch_mm >= kShallowNotchMm; }
 };
 
 // The line between the lips on the skin.
@@ -51,7 +54,7 @@ struct MouthLine {
   MouthCornerReason left_corner = MouthCornerReason::kNotchEnds;
   MouthStart start = MouthStart::kUpperIncisors;
   double start_up = 0;      // face coordinate of the start
-  double seen_share = 0;    // of the points: parted, or with a notch of 1.5 mm or more
+  double seen_share = 0;    // of the points
   double parted_share = 0;  // of the points
   bool near_metal = false;  // metal within 25 mm of a point: streaks may blur the skin
 

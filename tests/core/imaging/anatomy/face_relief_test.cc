@@ -8,9 +8,8 @@
 #include <functional>
 #include <limits>
 
-#include <Eigen/Geometry>
-
 #include "gtest/gtest.h"
+#include <Eigen/Geometry>
 
 namespace tissueform {
 namespace {
@@ -82,9 +81,8 @@ TEST(FaceReliefTest, HairBeforeTheSkinIsNotSkin) {
 
 TEST(FaceReliefTest, RaysThatMeetNothingOrTheEndOfTheCtSayWhich) {
   const FaceAxes axes(TiltedHead());
-  HeadSegmentation head = HeadOf(axes, [&](const FaceCoordinates& at) {
-    return at.up > 2 ? -1000 : BlurredHu(10, at);
-  });
+  HeadSegmentation head = HeadOf(
+      axes, [&](const FaceCoordinates& at) { return at.up > 2 ? -1000 : BlurredHu(10, at); });
   head.cut = LabelGrid(head.hu.geometry);
   ForEachVoxel(LabelGrid(head.hu.geometry, 1), [&](size_t index, const Eigen::Vector3d& place) {
     const FaceCoordinates at = axes.Of(place);

@@ -77,9 +77,9 @@ TEST(MouthLineHeadsTest, WithoutTeethTheSearchBeginsMidwayBetweenTheJaws) {
   ASSERT_OK_AND_ASSIGN(const Mouth mouth, MouthOf(ct));
   EXPECT_EQ(mouth.line.start, MouthStart::kJawRidges);
   const FaceAxes axes(mouth.landmarks);
-  EXPECT_DOUBLE_EQ(mouth.line.start_up, (axes.Of(mouth.landmarks.upper_incisor).up +
-                                         axes.Of(mouth.landmarks.lower_incisor).up) /
-                                            2);
+  EXPECT_DOUBLE_EQ(
+      mouth.line.start_up,
+      (axes.Of(mouth.landmarks.upper_incisor).up + axes.Of(mouth.landmarks.lower_incisor).up) / 2);
   ExpectLineInTheSlit(mouth);
   EXPECT_THAT(DescribeMouthLine(mouth.line)[0], HasSubstr("upper front teeth are missing"));
 }
