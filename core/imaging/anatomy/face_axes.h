@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <Eigen/Geometry>
+
 #include "core/imaging/anatomy/landmarks.h"
 
 namespace tissueform {

@@ -151,8 +151,7 @@ Json MouthJson(const absl::StatusOr<MouthLine>& mouth, const Landmarks& landmark
 std::vector<Scene> MouthScenes(const SkinCoverage& coverage, const Landmarks& landmarks,
                                const MouthLine& mouth) {
   const FaceAxes axes(landmarks);
-  SurfaceLayer skin =
-      SkinAboutMouth(coverage, axes, mouth.points[mouth.points.size() / 2].at);
+  SurfaceLayer skin = SkinAboutMouth(coverage, axes, mouth.points[mouth.points.size() / 2].at);
   std::vector<SurfaceLayer> layers = LineLayers(PlacesBefore(skin, axes, mouth), mouth);
   layers.push_back(std::move(skin));
   const Vector3d origin = axes.Place({});

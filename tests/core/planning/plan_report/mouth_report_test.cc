@@ -24,7 +24,8 @@ Landmarks UprightHead() {
 MouthLine HalfSeenLine() {
   MouthLine line;
   for (int left = -2; left <= 1; ++left) {
-    line.points.push_back({.at = {static_cast<double>(left), 10, 1}, .notch_mm = left > 0 ? 0.0 : 3.0});
+    line.points.push_back(
+        {.at = {static_cast<double>(left), 10, 1}, .notch_mm = left > 0 ? 0.0 : 3.0});
   }
   line.left_corner = MouthCornerReason::kNoNotch;
   line.seen_share = 0.75;
