@@ -7,11 +7,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 
 #include "core/base/status_macros.h"
 #include "core/planning/plan_report/coverage_report.h"
 #include "core/planning/plan_report/label_colours.h"
 #include "core/planning/plan_report/metal_report.h"
+#include "core/planning/plan_report/mouth_report.h"
 #include "core/planning/plan_report/plan_scenes.h"
 #include "core/planning/plan_report/slice_pictures.h"
 #include "core/planning/rendering/figure.h"
@@ -120,6 +122,19 @@ absl::StatusOr<ReportPicture> DrawCoverage(const PlanBuild& build, const std::st
   return picture;
 }
 
+absl::StatusOr<ReportPicture> DrawMouth(const PlanBuild& build, const MouthLine& mouth,
+                                        const std::string& folder) {
+  const ReportPicture picture{
+      "mouth.png", "Line between the lips",
+      absl::StrCat("The CT's skin about the mouth, with the line that was found on it; the model "
+                   "does not use it yet. ",
+                   absl::StrJoin(DescribeMouthLine(mouth), " ")),
+      MouthLegend()};
+  TF_RETURN_IF_ERROR(
+      WriteScenes(picture, MouthScenes(build.coverage, build.landmarks, mouth), folder));
+  return picture;
+}
+
 absl::StatusOr<ReportPicture> DrawConstraints(const PlanBuild& build, const std::string& folder) {
   ReportPicture picture{
       "constraints.png", "Where tissue is fixed and moved",
@@ -188,12 +203,17 @@ absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
 
 absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& build,
                                                             const PlanMeasures& measures,
+                                                            const absl::StatusOr<MouthLine>& mouth,
                                                             const std::string& folder) {
   std::vector<ReportPicture> pictures;
   for (const auto draw :
        {DrawSlices, DrawBone, DrawSkin, DrawCoverage, DrawConstraints, DrawTets}) {
     TF_ASSIGN_OR_RETURN(ReportPicture picture, draw(build, folder));
     pictures.push_back(std::move(picture));
+  }
+  if (mouth.ok()) {
+    TF_ASSIGN_OR_RETURN(ReportPicture line, DrawMouth(build, *mouth, folder));
+    pictures.push_back(std::move(line));
   }
   if (build.metal.any()) {
     TF_ASSIGN_OR_RETURN(ReportPicture metal, DrawMetal(build, folder));

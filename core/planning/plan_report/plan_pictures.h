@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/imaging/anatomy/mouth_line.h"
 #include "core/planning/plan_building/plan_builder.h"
 #include "core/planning/plan_report/plan_measures.h"
 #include "core/planning/rendering/panels.h"
@@ -28,12 +29,13 @@ struct ReportPicture {
   std::vector<LegendEntry> legend = {};
 };
 
-// Draws the pictures of a plan into the folder, which exists, and says what they show. Needs an X
-// display (VirtualDisplay).
+// Draws the pictures of a plan into the folder, which exists, and says what they show; none of the
+// mouth line where `mouth` is an error. Needs an X display (VirtualDisplay).
 //
 // Errors: those of Figure::WritePng and ExtractSurface.
 absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& build,
                                                             const PlanMeasures& measures,
+                                                            const absl::StatusOr<MouthLine>& mouth,
                                                             const std::string& folder);
 
 }  // namespace tissueform

@@ -191,11 +191,20 @@ std::string MetalSection(const Json& report) {
   return Section("Metal", JsonTable(rest) + JsonColumns(metal["pieces"]));
 }
 
+// The sentences; the points are for programs.
+std::string MouthSection(const Json& report) {
+  std::string texts;
+  for (const Json& text : report.value("mouth_line", Json::object()).value("says", Json::array())) {
+    absl::StrAppend(&texts, "<p>", EscapeHtml(text.get<std::string>()), "</p>\n");
+  }
+  return texts.empty() ? "" : Section("Line between the lips", texts);
+}
+
 std::string Tables(const Json& report) {
   return absl::StrCat(
       Section("Segments", SegmentTables(report["segments"])),
       Section("Bone and its separation", JsonTable(report["bone"])), MetalSection(report),
-      Section("Mesh", JsonTable(report["mesh"])),
+      MouthSection(report), Section("Mesh", JsonTable(report["mesh"])),
       Section("Distances", JsonTable(report["distances"])),
       Section("The CT's skin in the mesh", JsonTable(report["coverage"])),
       Section("Stiffness", StiffnessHtml(report["stiffness"])),

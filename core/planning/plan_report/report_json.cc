@@ -16,6 +16,7 @@
 #include "core/planning/plan_report/library_versions.h"
 #include "core/planning/plan_report/lips_report.h"
 #include "core/planning/plan_report/metal_report.h"
+#include "core/planning/plan_report/mouth_report.h"
 
 namespace tissueform {
 namespace {
@@ -159,7 +160,7 @@ Json PicturesJson(const std::vector<ReportPicture>& pictures) {
 }  // namespace
 
 Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
-                    const std::string& program_version,
+                    const absl::StatusOr<MouthLine>& mouth, const std::string& program_version,
                     const std::vector<ReportPicture>& pictures) {
   return {{"format", "tissueform-plan-report"},
           {"version", 1},
@@ -178,6 +179,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"region_of_interest", RegionJson(build)},
           {"soft_tissue", SoftTissueJson(build.soft_tissue)},
           {"lips", LipsJson(MeasureLipContact(build.soft_tissue.labels, build.landmarks))},
+          {"mouth_line", MouthJson(mouth, build.landmarks)},
           {"mesh", MeshJson(build, measures)},
           {"distances", DistancesJson(build, measures)},
           {"coverage", CoverageJson(build.coverage)},

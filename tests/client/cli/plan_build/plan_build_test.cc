@@ -94,17 +94,19 @@ TEST_F(PlanBuildTest, PlanIsBuiltReportedAndCanBeRun) {
   ASSERT_THAT(result, Succeeds());
   EXPECT_THAT(result.out, AllOf(HasSubstr("head/plan.json"), HasSubstr("handle  mandible")));
 
-  EXPECT_THAT(AllFiles("head"),
-              ElementsAre("head.vtu", "pictures/bone.png", "pictures/constraints.png",
-                          "pictures/coverage.png", "pictures/quality.png", "pictures/skin.png",
-                          "pictures/slices.png", "pictures/tets.png", "plan.json", "report.html",
-                          "report.json", "segments/mandible.stl", "viewer.glb"));
+  EXPECT_THAT(
+      AllFiles("head"),
+      ElementsAre("head.vtu", "pictures/bone.png", "pictures/constraints.png",
+                  "pictures/coverage.png", "pictures/mouth.png", "pictures/quality.png",
+                  "pictures/skin.png", "pictures/slices.png", "pictures/tets.png", "plan.json",
+                  "report.html", "report.json", "segments/mandible.stl", "viewer.glb"));
   const auto report = nlohmann::json::parse(Read("head/report.json"));
   EXPECT_EQ(report["format"], "tissueform-plan-report");
   EXPECT_EQ(report["input"]["size_voxels"], nlohmann::json({64, 64, 93}));
   EXPECT_EQ(report["recipe"]["spacing_mm"], 4);
   EXPECT_EQ(report["recipe"]["poisson_ratio"], 0.45);  // which the recipe leaves out
   EXPECT_EQ(report["quality"].size(), 12U);
+  EXPECT_EQ(report["mouth_line"]["found"], true);
   for (const auto& picture : report["pictures"]) {
     const std::string file = picture["file"];
     EXPECT_THAT(Read("head/" + file), StartsWith("\x89PNG"));

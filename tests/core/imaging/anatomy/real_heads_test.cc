@@ -14,6 +14,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/imaging/anatomy/bone_parts.h"
+#include "core/imaging/anatomy/mouth_line.h"
 #include "core/imaging/anatomy/osteotomy.h"
 #include "core/imaging/anatomy/scanner_cut.h"
 #include "core/imaging/anatomy/soft_tissue.h"
@@ -267,6 +268,16 @@ TEST(RealHeadsTest, ACadaverWithTeethInOcclusionIsTakenApart) {
   ASSERT_FALSE(cuts.empty());
   EXPECT_NEAR(cuts[0].middle.y(), 145, 4);  // the row that the circle reaches, in pixels of 1 mm
   EXPECT_GT(cuts[0].region_mm2[static_cast<size_t>(SkinRegion::kNose)], 200);
+
+  // By eye the closed lips meet at 253, 138, 1075.7; a moustache hides both corners.
+  ASSERT_OK_AND_ASSIGN(const MouthLine mouth, FindMouthLine(head, a.landmarks));
+  const FaceAxes axes(a.landmarks);
+  for (const MouthLinePoint& point : mouth.points) {
+    if (std::abs(point.at.left) > 10) continue;
+    EXPECT_NEAR(axes.Place(point.at).z(), 1076, 2) << point.at.left;
+  }
+  EXPECT_EQ(mouth.right_corner, MouthCornerReason::kNoNotch);
+  EXPECT_EQ(mouth.left_corner, MouthCornerReason::kNoNotch);
 }
 
 // Tilted slices of two distances, from the upper jaw up.

@@ -58,6 +58,14 @@ TEST(ReportHtmlTest, CautionsHaveASectionIfThereAreAny) {
   EXPECT_THAT(PlanReportHtml(report, {}), Not(HasSubstr("Limitations of this CT")));
 }
 
+TEST(ReportHtmlTest, TheMouthLineIsDescribedInWords) {
+  nlohmann::ordered_json report = SmallReport(true);
+  report["mouth_line"] = {{"says", {kAttack, "the left corner is unsure"}}, {"points_mm", {1234}}};
+  EXPECT_THAT(PlanReportHtml(report, {}),
+              AllOf(HasSubstr("Line between the lips"), HasSubstr("<p>the left corner is unsure"),
+                    Not(HasSubstr("<script")), Not(HasSubstr("1234"))));
+}
+
 TEST(ReportHtmlTest, PageSaysWhatIsMetAndThatItIsNoMedicalDevice) {
   const std::string good = PlanReportHtml(SmallReport(true), {});
   EXPECT_THAT(good, AllOf(HasSubstr("all requirements are met"), Not(HasSubstr("not met")),
