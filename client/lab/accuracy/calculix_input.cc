@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -18,6 +20,8 @@ namespace {
 // in mm and no stiffness in Pa that means anything is as small.
 constexpr double kSmallest = 1e-90;
 
+// Pa per mm: a thousand times as stiff as a layer of tissue of 1 mm.
+constexpr double kSurfaceSpring = 1.5e7;
 // Pa mm^2: the pull of an open gap element, which cannot be zero.
 constexpr double kGapTension = 1e-9;
 
@@ -96,13 +100,14 @@ Eigen::Index BoneNode(const CalculixProblem& problem, size_t row) {
 
 void AppendBoneNodes(const CalculixProblem& problem, std::string* text) {
   const std::vector<ContactRow>& rows = problem.constraints.contact();
-  if (rows.empty()) return;
-  absl::StrAppend(text, "*NODE, NSET=BONE\n");
+  std::string nodes;
   for (size_t row = 0; row < rows.size(); ++row) {
+    if (rows[row].other != ContactRow::kBone) continue;
     const auto place = problem.mesh.positions().row(rows[row].vertex);
-    absl::StrAppend(text, BoneNode(problem, row), ", ", Number(place[0]), ", ", Number(place[1]),
+    absl::StrAppend(&nodes, BoneNode(problem, row), ", ", Number(place[0]), ", ", Number(place[1]),
                     ", ", Number(place[2]), "\n");
   }
+  if (!nodes.empty()) absl::StrAppend(text, "*NODE, NSET=BONE\n", nodes);
 }
 
 // n . (u_vertex - u_bone) = 0, by the unknown with the largest coefficient.
@@ -135,8 +140,44 @@ void AppendGap(const CalculixProblem& problem, size_t row, std::string* text) {
   absl::StrAppend(text, ", , ", Number(kGapSpring), ", ", Number(kGapTension), "\n");
 }
 
+// The element faces whose vertices are all among `vertices`, as a surface.
+void AppendSurface(const CalculixProblem& problem, const std::set<int32_t>& vertices,
+                   const std::string& name, std::string* text) {
+  // CalculiX's faces S1 to S4 of a tet.
+  constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+  absl::StrAppend(text, "*SURFACE, NAME=", name, ", TYPE=ELEMENT\n");
+  for (Eigen::Index t = 0; t < problem.mesh.num_tets(); ++t) {
+    const auto tet = problem.mesh.tets().row(t);
+    for (int face = 0; face < 4; ++face) {
+      const bool is_whole = std::ranges::all_of(
+          kFaces[face], [&](int corner) { return vertices.contains(tet[corner]); });
+      if (is_whole) absl::StrAppend(text, t + 1, ", S", face + 1, "\n");
+    }
+  }
+}
+
+void AppendContactPair(const CalculixProblem& problem, std::string* text) {
+  std::set<int32_t> vertices;
+  std::set<int32_t> others;
+  for (const ContactRow& row : problem.constraints.contact()) {
+    vertices.insert(row.vertex);
+    others.insert(row.other);
+  }
+  AppendSurface(problem, vertices, "UPPER", text);
+  AppendSurface(problem, others, "LOWER", text);
+  absl::StrAppend(text,
+                  "*SURFACE INTERACTION, NAME=TOUCH\n"
+                  "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n",
+                  Number(kSurfaceSpring),
+                  "\n*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE\nUPPER, LOWER\n");
+}
+
 void AppendContact(const CalculixProblem& problem, std::string* text) {
   const std::vector<ContactRow>& rows = problem.constraints.contact();
+  if (problem.contact == CalculixContact::kSurfaces) {
+    AppendContactPair(problem, text);
+    return;
+  }
   for (size_t row = 0; row < rows.size(); ++row) {
     rows[row].bilateral ? AppendSliding(problem, row, text) : AppendGap(problem, row, text);
   }
@@ -145,6 +186,7 @@ void AppendContact(const CalculixProblem& problem, std::string* text) {
 void AppendBoneMotions(const CalculixProblem& problem, std::string* text) {
   const std::vector<ContactRow>& rows = problem.constraints.contact();
   for (size_t row = 0; row < rows.size(); ++row) {
+    if (rows[row].other != ContactRow::kBone) continue;
     for (int axis = 0; axis < 3; ++axis) {
       const double value = MotionScale(problem) *
                            problem.bone_motions[static_cast<Eigen::Index>(row)] *
@@ -195,7 +237,8 @@ double MotionScale(const CalculixProblem& problem) {
   const std::vector<ContactRow>& rows = problem.constraints.contact();
   const bool lifts_off =
       std::ranges::any_of(rows, [](const ContactRow& row) { return !row.bilateral; });
-  return problem.law == CalculixLaw::kLinear && lifts_off ? kSmallMotion : 1;
+  const bool has_gap_elements = lifts_off && problem.contact == CalculixContact::kGapElements;
+  return problem.law == CalculixLaw::kLinear && has_gap_elements ? kSmallMotion : 1;
 }
 
 std::string CalculixInput(const CalculixProblem& problem) {

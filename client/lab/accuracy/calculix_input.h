@@ -25,6 +25,13 @@ enum class CalculixLaw {
   kNeoHookean,  // *HYPERELASTIC, NEO HOOKE with NLGEOM, loaded in increments
 };
 
+enum class CalculixContact {
+  kGapElements,  // the same rows as ours
+  // A contact pair, surface to surface, of the faces between the vertices and the others of rows
+  // between two lips: CalculiX finds its own rows.
+  kSurfaces,
+};
+
 // Tets of constant strain whose constrained vertices are displaced, all others free of forces.
 struct CalculixProblem {
   TetMesh mesh;
@@ -37,6 +44,7 @@ struct CalculixProblem {
   bool forces_and_stresses = false;
   // How far the bone of every contact row moves along the row's normal, in mm; 0 between two lips.
   Eigen::VectorXd bone_motions = {};
+  CalculixContact contact = CalculixContact::kGapElements;
 };
 
 // Where the poses take the constrained vertices, minus where these rest: #constrained by 3, mm.
@@ -49,7 +57,7 @@ Positions ConstrainedDisplacements(const TetMesh& mesh, const ConstraintSet& con
 Eigen::VectorXd BoneMotions(const TetMesh& mesh, const ConstraintSet& constraints,
                             absl::Span<const HandlePose> poses);
 
-// kSmallMotion where the law is linear and there are unilateral contact rows, else 1.
+// kSmallMotion where the law is linear and there are gap elements, else 1.
 double MotionScale(const CalculixProblem& problem);
 
 // The problem as an input file of CalculiX (.inp): C3D4 elements, one material for each distinct

@@ -47,9 +47,10 @@ absl::StatusOr<std::unique_ptr<ElasticContact>> ElasticContact::Create(
   for (size_t row = 0; row < constraints.contact().size(); ++row) {
     if (!constraints.contact()[row].bilateral) contact->rows_.push_back(static_cast<int32_t>(row));
   }
-  const auto num_rows = static_cast<int64_t>(contact->rows_.size());
-  if (num_rows > 0) contact->boundary_ = BoundaryVertices(mesh);
+  if (contact->rows_.empty()) return contact;
+  contact->boundary_ = BoundaryVertices(mesh);
   if (admission) {
+    const auto num_rows = static_cast<int64_t>(contact->rows_.size());
     const auto boundary_rows = 3 * static_cast<int64_t>(contact->boundary_.size());
     TF_RETURN_IF_ERROR(
         admission(num_rows * (num_rows + elastic.response_columns().cols() + boundary_rows) *
@@ -138,7 +139,6 @@ absl::StatusOr<Eigen::MatrixXd> ElasticContact::ForceColumns(
 }
 
 absl::Status ElasticContact::CheckCompliance() const {
-  if (rows_.empty()) return absl::OkStatus();
   const double largest = compliance_.diagonal().maxCoeff();
   for (Eigen::Index r = 0; r < compliance_.rows(); ++r) {
     if (compliance_(r, r) > kNoCompliance * largest) continue;

@@ -1,8 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <numeric>
+#include <vector>
 
 #include "client/lab/accuracy/accuracy_case.h"
 #include "client/lab/accuracy/calculix.h"
@@ -49,6 +52,13 @@ class CalculixOracleTest : public ::testing::Test {
 
   static absl::StatusOr<Positions> Answer(const AccuracyCase& problem, DeformationModel model,
                                           double poisson_ratio) {
+    auto deformation = DeformationOf(problem, model, poisson_ratio);
+    if (!deformation.ok()) return deformation.status();
+    return deformation->positions;
+  }
+
+  static absl::StatusOr<Deformation> DeformationOf(const AccuracyCase& problem,
+                                                   DeformationModel model, double poisson_ratio) {
     PreparationOptions options;
     options.poisson_ratio = poisson_ratio;
     const auto preparation = MeshPreparation::Create(problem.mesh, problem.stiffness,
@@ -61,8 +71,9 @@ class CalculixOracleTest : public ::testing::Test {
     auto deformation = (*deformer)->Deform(problem.poses);
     if (!deformation.ok()) return deformation.status();
     if (!deformation->summary.converged) return absl::InternalError("not converged");
-    return deformation->positions;
+    return deformation;
   }
+  const std::string& folder() const { return folder_; }
 
  private:
   std::string folder_;
@@ -134,6 +145,67 @@ TEST_F(CalculixOracleTest, LinearElasticityWithContactEqualsCalculixOnAHead) {
   ASSERT_OK_AND_ASSIGN(const Positions sliding,
                        Answer(with, DeformationModel::kLinearElastic, 0.45));
   EXPECT_GT((sticking - sliding).rowwise().norm().maxCoeff(), 0.1);
+}
+
+// Two blocks of 3 x 3 x 4 mm, one on the other; the upper one is pressed down and tilted, so that a
+// part of the faces lifts off. Vertices of the faces lie in pairs.
+AccuracyCase TwoBlocks() {
+  const TetMesh block = testing::Bar({6, 6, 8}, 0.5);
+  const auto vertices = static_cast<int32_t>(block.num_vertices());
+  Positions positions(2 * vertices, 3);
+  positions << block.positions(), block.positions().rowwise() + Eigen::RowVector3d(0, 0, 4);
+  TetIndices tets(2 * block.num_tets(), 4);
+  tets << block.tets(), (block.tets().array() + vertices).matrix();
+  const TetMesh mesh = *TetMesh::Create(positions, tets);
+  std::vector<ContactRow> rows;
+  for (int32_t v = 0; v < vertices; ++v) {
+    for (int32_t w = vertices; w < 2 * vertices && positions(v, 2) == 4; ++w) {
+      if (positions.row(v) != positions.row(w)) continue;
+      rows.push_back({.vertex = w, .other = v, .normal = Eigen::Vector3d::UnitZ()});
+    }
+  }
+  const auto at_height = [&mesh](double height) {
+    return testing::SelectVertices(mesh,
+                                   [height](const Eigen::Vector3d& x) { return x.z() == height; });
+  };
+  HandlePose pose;
+  pose.rotation_vector = {0.08, 0, 0};
+  pose.pivot_mm = {1.5, 1.5, 8};
+  pose.translation_mm = {0.03, 0.02, -0.1};
+  return {"two_blocks",
+          "",
+          mesh,
+          Eigen::VectorXd::Constant(mesh.num_tets(), 15000),
+          ConstraintSet::Create(mesh, at_height(0), {{"top", at_height(8)}}, rows).value(),
+          {pose},
+          {}};
+}
+
+// With another way to say contact: CalculiX integrates the pressure of one surface on the other.
+TEST_F(CalculixOracleTest, LinearElasticityWithContactIsCalculixsOfTwoSurfaces) {
+  const AccuracyCase blocks = TwoBlocks();
+  CalculixProblem problem{blocks.mesh,
+                          blocks.stiffness,
+                          0.3,
+                          blocks.constraints,
+                          ConstrainedDisplacements(blocks.mesh, blocks.constraints, blocks.poses),
+                          CalculixLaw::kLinear,
+                          /*forces_and_stresses=*/true,
+                          BoneMotions(blocks.mesh, blocks.constraints, blocks.poses)};
+  problem.contact = CalculixContact::kSurfaces;
+  ASSERT_OK_AND_ASSIGN(const CalculixResult reference, RunCalculix(problem, folder()));
+  ASSERT_OK_AND_ASSIGN(const Deformation answer,
+                       DeformationOf(blocks, DeformationModel::kLinearElastic, 0.3));
+  const auto open = std::ranges::count(answer.contact.forces, 0.0);
+  EXPECT_GT(open, 5);
+  EXPECT_LT(open, 40) << "of 49";
+  const double distance = (answer.positions - reference.deformed).rowwise().norm().maxCoeff();
+  EXPECT_LT(distance, 5e-4 * LargestMove(blocks));
+  const double force =
+      std::accumulate(answer.contact.forces.begin(), answer.contact.forces.end(), 0.0);
+  const Eigen::RowVector3d expected =
+      reference.forces(blocks.constraints.fixed(), Eigen::all).colwise().sum();
+  EXPECT_NEAR(force, expected.z(), 1e-3 * expected.z());
 }
 
 // CalculiX prints seven digits: up to 5e-7 mm for each coordinate of a move of some millimetres.

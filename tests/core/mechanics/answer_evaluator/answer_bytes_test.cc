@@ -24,7 +24,7 @@ constexpr size_t kEntryBytes = 16;
 class AnswerBytesTest : public ::testing::TestWithParam<Evaluated> {
  protected:
   AnswerBytesTest() {
-    const auto preparation = PrepareMesh(Bar({3, 6, 6}, 2.0, 0.2), GetParam().num_handles);
+    const auto preparation = PrepareEvaluated(Bar({3, 6, 6}, 2.0, 0.2), GetParam());
     bytes_ = WriteAnswers((*CreateResponse(preparation, AllVertices(preparation->mesh()),
                                            {.model = GetParam().model}))
                               ->Describe());
@@ -75,15 +75,15 @@ TEST_P(AnswerBytesTest, ErrorsSayWhatIsWrong) {
   EXPECT_EQ(ReadAnswers(bytes_).error, AnswerError::kNotAnswers);
 }
 
-// Readers of version 1 pass over the sections of a third order, and would answer by others alone.
+// Readers of earlier versions pass over the sections of a third order or of contact, and would
+// answer by the others alone.
 TEST_P(AnswerBytesTest, SayTheLowestVersionThatHasThem) {
-  const bool third_order = GetParam().name == "neo_hookean_third_order";
-  EXPECT_EQ(bytes_[8], third_order ? 2 : 1);
-  Put(8, uint32_t{1});
-  EXPECT_EQ(ReadAnswers(bytes_).error,
-            third_order ? AnswerError::kInconsistent : AnswerError::kNone);
-  Put(8, uint32_t{2});
-  EXPECT_EQ(ReadAnswers(bytes_).error, AnswerError::kNone);
+  EXPECT_EQ(bytes_[8], static_cast<char>(GetParam().version));
+  for (uint32_t version = 1; version <= kAnswerFormatVersion; ++version) {
+    Put(8, version);
+    EXPECT_EQ(ReadAnswers(bytes_).error,
+              version < GetParam().version ? AnswerError::kInconsistent : AnswerError::kNone);
+  }
 }
 
 // Of the second section: number, type, offset, count.

@@ -27,13 +27,6 @@ struct Problem {
   std::vector<int32_t> vertices;
 };
 
-Problem OfAllVertices(const TetMesh& mesh, int num_handles) {
-  return {PrepareMesh(mesh, num_handles), AllVertices(mesh)};
-}
-
-Problem BarWithOneHandle() { return OfAllVertices(Bar({4, 4, 8}, 2.0, 0.2), 1); }
-Problem BarWithTwoHandles() { return OfAllVertices(Bar({4, 6, 8}, 2.0, 0.2), 2); }
-
 TEST(AnswerSizeTest, AHeadWithThreeSegmentsTravelsInAFewMegabytes) {
   const PlanProblem plan = *ResolvePlan(*ReadPlan(TestDataPath("plans/three_segments/plan.json")));
   const Problem problem{*MeshPreparation::Create(*plan.mesh, plan.stiffness, plan.constraints, {}),
@@ -51,7 +44,8 @@ TEST(AnswerSizeTest, AHeadWithThreeSegmentsTravelsInAFewMegabytes) {
 
 class EvaluatedModelTest : public ::testing::TestWithParam<Evaluated> {
  protected:
-  const Problem problem_ = GetParam().num_handles == 2 ? BarWithTwoHandles() : BarWithOneHandle();
+  const TetMesh bar_ = Bar({4, GetParam().num_handles == 2 ? 6 : 4, 8}, 2.0, 0.2);
+  const Problem problem_{PrepareEvaluated(bar_, GetParam()), AllVertices(bar_)};
   const std::unique_ptr<VertexResponse> response_ =
       *CreateResponse(problem_.preparation, problem_.vertices, {.model = GetParam().model});
 };

@@ -34,8 +34,8 @@ FREE, FIXED = -2, -1
 
 def read_sections(data):
     magic, version, count = struct.unpack_from("<8sII", data, 0)
-    if magic != b"TFANSWER" or version not in (1, 2):
-        sys.exit(f"not prepared answers of version 1 or 2: {magic} {version}")
+    if magic != b"TFANSWER" or version not in (1, 2, 3):
+        sys.exit(f"not prepared answers of version 1 to 3: {magic} {version}")
     sections = {}
     for i in range(count):
         number, kind, offset, length = struct.unpack_from("<IIII", data, 16 + 16 * i)
@@ -131,6 +131,25 @@ class Answers:
             A, b = self.motion(pose, self.section(10))
             factors.append(np.concatenate([A, b[:, None]], axis=1).ravel())
         return np.concatenate(factors)[:, None]
+
+    def contact_forces(self, coefficients):
+        """Forces l >= 0 with gaps q + C l >= 0 and l (q + C l) = 0, by Murty's least index: the first row that is wrong
+        changes sides. It ends because C is positive definite."""
+        q = self.section(50).copy()
+        rows = len(q)
+        if rows == 0:
+            return np.zeros((0, 1))
+        q += self.section(51).reshape(rows, -1) @ coefficients[:, 0]
+        C = self.section(52).reshape(rows, rows)
+        active = np.zeros(rows, bool)
+        while True:
+            forces = np.zeros(rows)
+            forces[active] = np.linalg.solve(C[np.ix_(active, active)], -q[active])
+            gaps = q + C @ forces
+            wrong = np.where(active, forces < 0, gaps < -1e-12)
+            if not wrong.any():
+                return forces[:, None]
+            active[np.argmax(wrong)] ^= True
 
     def pairs(self, poses):
         numbers = []
@@ -228,6 +247,8 @@ class Answers:
         else:
             gradient = self.model == GRADIENT_FIELD
             factors, error = self.gradient_factors(poses) if gradient else (self.elastic_factors(poses), 0)
+            if not gradient:
+                factors = np.concatenate([factors, self.contact_forces(factors)])
             moves, compression_error = self.compressed(factors)
             error += compression_error
         positions = np.zeros((len(self.regions), 3))

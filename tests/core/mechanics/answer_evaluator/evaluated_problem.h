@@ -31,14 +31,44 @@ struct Evaluated {
   std::string name;
   DeformationModel model;
   int num_handles;
+  bool touches = false;  // with contact rows
+  uint32_t version = 1;  // of the bytes
 };
 
+// PrepareMesh; where the mesh touches, one wall of it slides on fixed bone, and a second one may
+// lift off fixed bone and that of the first handle in turn.
+inline std::shared_ptr<MeshPreparation> PrepareEvaluated(const TetMesh& mesh,
+                                                         const Evaluated& evaluated) {
+  if (!evaluated.touches) return PrepareMesh(mesh, evaluated.num_handles);
+  const ConstraintSet regions = StackedHandles(mesh, evaluated.num_handles);
+  const Eigen::RowVector3d low = mesh.positions().colwise().minCoeff();
+  const Eigen::RowVector3d thin = 0.1 * (mesh.positions().colwise().maxCoeff() - low);
+  std::vector<ContactRow> rows;
+  for (int32_t v = 0; v < mesh.num_vertices(); ++v) {
+    const Eigen::RowVector3d place = mesh.positions().row(v) - low;
+    if (std::ranges::binary_search(regions.constrained(), v)) continue;
+    if (place.x() < thin.x()) {
+      rows.push_back(
+          {.vertex = v, .normal = Eigen::Vector3d(1, 0.2, 0).normalized(), .bilateral = true});
+    } else if (place.y() < thin.y()) {
+      rows.push_back({.vertex = v,
+                      .handle = v % 2 - 1,
+                      .normal = Eigen::Vector3d::UnitY(),
+                      .gap_mm = v % 3 * 0.02});
+    }
+  }
+  return *MeshPreparation::Create(
+      mesh, MixedStiffness(mesh.num_tets()),
+      *ConstraintSet::Create(mesh, regions.fixed(), regions.handles(), std::move(rows)), {});
+}
+
 inline const std::vector<Evaluated>& EvaluatedModels() {
-  static const auto* const models =
-      new std::vector<Evaluated>{{"gradient_field", DeformationModel::kGradientField, 2},
-                                 {"linear_elastic", DeformationModel::kLinearElastic, 2},
-                                 {"neo_hookean", DeformationModel::kNeoHookean, 2},
-                                 {"neo_hookean_third_order", DeformationModel::kNeoHookean, 1}};
+  static const auto* const models = new std::vector<Evaluated>{
+      {"gradient_field", DeformationModel::kGradientField, 2},
+      {"linear_elastic", DeformationModel::kLinearElastic, 2},
+      {"linear_elastic_contact", DeformationModel::kLinearElastic, 2, true, 3},
+      {"neo_hookean", DeformationModel::kNeoHookean, 2},
+      {"neo_hookean_third_order", DeformationModel::kNeoHookean, 1, false, 2}};
   return *models;
 }
 

@@ -79,9 +79,10 @@ class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
  protected:
   // Every other vertex of a jittered bar with two handles, or of a smaller one with one.
   GoldenAnswersTest()
-      : preparation_(PrepareMesh(
-            GetParam().num_handles == 2 ? Bar({4, 6, 10}, 2.0, 0.2) : Bar({3, 4, 8}, 2.0, 0.2),
-            GetParam().num_handles)) {
+      : preparation_(PrepareEvaluated(GetParam().touches            ? Bar({3, 4, 8}, 2.0, 0.2)
+                                      : GetParam().num_handles == 2 ? Bar({4, 6, 10}, 2.0, 0.2)
+                                                                    : Bar({3, 4, 8}, 2.0, 0.2),
+                                      GetParam())) {
     std::vector<int32_t> vertices;
     for (int32_t v = 0; v < preparation_->mesh().num_vertices(); v += 2) vertices.push_back(v);
     response_ = *CreateResponse(preparation_, vertices,
@@ -256,8 +257,8 @@ TEST_P(GoldenFileTest, AProgramThatIsNotOursGivesTheSame) {
 
 INSTANTIATE_TEST_SUITE_P(Files, GoldenFileTest,
                          ::testing::Values("gradient_field", "linear_elastic",
-                                           "linear_elastic_band", "neo_hookean",
-                                           "neo_hookean_third_order"),
+                                           "linear_elastic_band", "linear_elastic_contact",
+                                           "neo_hookean", "neo_hookean_third_order"),
                          [](const auto& test) { return test.param; });
 
 INSTANTIATE_TEST_SUITE_P(Models, GoldenAnswersTest, ::testing::ValuesIn(EvaluatedModels()),

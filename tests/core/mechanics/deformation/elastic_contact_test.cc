@@ -7,14 +7,17 @@
 #include <memory>
 #include <numeric>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "core/mechanics/contact/lcp_solver.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
@@ -281,6 +284,35 @@ TEST_F(TwoBlocksTest, AnswersDoNotDependOnTheDragBefore) {
     some_open += open > 0 && open < 16 ? 1 : 0;
   }
   EXPECT_GT(some_open, 5U) << "the poses do not open the contact in part";
+}
+
+TEST_F(TwoBlocksTest, AThousandPosesDoNotPenetrateFromAnyStartAndStoreTheLeastEnergy) {
+  const ElasticContact& contact = **preparation_->Contact();
+  const ElasticSystem& elastic = **preparation_->Elastic();
+  const Eigen::MatrixXd& C = contact.compliance();
+  const auto rows = static_cast<size_t>(C.rows());
+  const std::span<const double> entries(C.data(), rows * rows);
+  const Eigen::LLT<Eigen::MatrixXd> factor(C);
+  LcpSolver warm(entries, rows);
+  std::mt19937 generator(8);
+  std::uniform_real_distribution<double> number(-0.5, 0.5);
+  for (int i = 0; i < 1000; ++i) {
+    HandlePose pose = Move({number(generator), number(generator), number(generator)});
+    pose.rotation_vector = {number(generator), number(generator), number(generator)};
+    const Eigen::VectorXd q = contact.Gaps(elastic.Coefficients({pose}));
+    LcpSolver cold(entries, rows);
+    const LcpSolution& solution = warm.Solve({q.data(), rows});
+    ASSERT_TRUE(solution.converged);
+    EXPECT_EQ(solution.sweeps, 0) << "the active set sufficed";
+    EXPECT_EQ(cold.Solve({q.data(), rows}).multipliers, solution.multipliers);
+    const Eigen::Map<const Eigen::VectorXd> forces(solution.multipliers.data(), C.rows());
+    EXPECT_GE((q + C * forces).minCoeff(), -1e-9);
+    // Of contact the body stores l C l / 2. Other ways to keep the blocks apart store no less.
+    Eigen::VectorXd other_gaps(C.rows());
+    for (double& gap : other_gaps) gap = std::max(0.0, number(generator));
+    const Eigen::VectorXd others = factor.solve(other_gaps - q);
+    EXPECT_LE(forces.dot(C * forces), others.dot(C * others) * (1 + 1e-12));
+  }
 }
 
 // Against the definition: forces and gaps from a solve with the stiffness matrix.
