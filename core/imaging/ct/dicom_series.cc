@@ -136,8 +136,8 @@ std::vector<SliceGroup> GroupsOf(const std::vector<Candidate>& candidates) {
 absl::Status NoneWanted(const std::vector<SliceGroup>& all, const SeriesChoice& choice) {
   if (all.empty()) {
     return absl::InvalidArgumentError(
-        "the folder holds no DICOM images, only a directory of them (DICOMDIR); name the folder "
-        "that holds the CT series");
+        "the folder holds no DICOM images, only a directory of them (DICOMDIR); copy the whole "
+        "disc, or name the folder that holds the CT series");
   }
   if (choice.series_number) {
     return absl::InvalidArgumentError(absl::StrCat(

@@ -185,7 +185,7 @@ TEST_F(DicomVolumeTest, OtherSeriesAndOtherFilesAreLeftAsideWithANote) {
 TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithWhatItHolds) {
   Expect(Read(), "the folder is empty");
   std::filesystem::create_directory(Path("inner"));
-  Expect(Read(), "no files but 1 folders");
+  Expect(Read(), "no files in it or in the folders below it");
   Write("readme.txt", "not a slice");
   Expect(Read(), "none of the 1 files in the folder is a DICOM file");
   Expect(Read({}, "readme.txt"), "the file is not a DICOM file");
