@@ -25,13 +25,13 @@ struct DicomFolder {
 
 // Which folders below the given one are read.
 enum class FoldersBelow {
-  kNever,        // a file of the folder was named
+  kNever,      // a file of the folder was named
   kWithoutCt,  // all, if the folder itself has no CT image
 };
 
-// Reads the headers of a folder's files. Symbolic links to folders are not followed. A DICOMDIR only
-// tells which files are missing: the headers of the files decide, as the DICOMDIR may be outdated.
-// In a helper program only. Internal to core/imaging/ct.
+// Reads the headers of a folder's files. Symbolic links to folders are not followed. A DICOMDIR
+// only tells which files are missing: the headers of the files decide, as the DICOMDIR may be
+// outdated. In a helper program only. Internal to core/imaging/ct.
 //
 // Errors: InvalidArgument for a folder without files; ResourceExhausted beyond the limits.
 absl::StatusOr<DicomFolder> ReadDicomFolder(const std::string& folder, FoldersBelow below,

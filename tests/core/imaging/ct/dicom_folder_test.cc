@@ -54,7 +54,8 @@ class DicomFolderTest : public CtFolder {
       records.emplace_back().Text(0x00041430, "CS", "IMAGE").Text(0x00041500, "CS", file);
     }
     DicomFile directory;
-    directory.Text(DicomFile::kSopClass, "UI", "1.2.840.10008.1.3.10").Sequence(0x00041220, records);
+    directory.Text(DicomFile::kSopClass, "UI", "1.2.840.10008.1.3.10")
+        .Sequence(0x00041220, records);
     Write("DICOMDIR", directory.Bytes());
   }
 };
@@ -105,7 +106,8 @@ TEST_F(DicomFolderTest, FolderWithACtIsReadWithoutThoseBelow) {
 
 TEST_F(DicomFolderTest, FilesThatADirectoryListsAndThatAreMissingAreCounted) {
   WriteDirectory({"S1\\IM000", "S1\\IM001", "..\\secret"});
-  EXPECT_THAT(Read(), StatusIs(kInvalid, HasSubstr("lists 3 files that are missing: copy the whole")));
+  EXPECT_THAT(Read(),
+              StatusIs(kInvalid, HasSubstr("lists 3 files that are missing: copy the whole")));
   // Mounted in small letters.
   WriteIn("s1", Scan(4, "H30s", 9));
   for (int i = 0; i < 9; ++i) {
