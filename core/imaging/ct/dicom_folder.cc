@@ -18,6 +18,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/imaging/ct/dicom_tags.h"
+#include "core/imaging/ct/file_bytes.h"
 
 namespace tissueform {
 namespace {
@@ -71,6 +72,7 @@ DicomFolder ReadHeaders(const Listing& listing) {
   for (size_t i = 0; i < listing.paths.size(); ++i) {
     std::vector<DicomHeader> headers = ReadDicomHeaders(listing.paths[i]);
     folder.others += headers.empty() ? 1 : 0;
+    folder.lfs_pointers += headers.empty() && IsLfsPointerFile(listing.paths[i]) ? 1 : 0;
     for (DicomHeader& header : headers) {
       header.file_number = static_cast<int>(i) + 1;
       folder.files.push_back(std::move(header));

@@ -18,6 +18,7 @@ struct DicomFolder {
   std::vector<DicomHeader> files;  // in the order of their paths, which gives their file_number
   int num_files = 0;               // of any kind
   int others = 0;                  // files that are not DICOM
+  int lfs_pointers = 0;            // of these: texts in place of files that were not fetched
   int num_folders = 0;             // below the given folder that were searched
   bool too_deep = false;           // folders deeper than max_folder_depth were left out
   int num_missing = 0;             // files that a DICOMDIR names and that do not exist

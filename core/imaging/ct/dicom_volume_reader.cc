@@ -78,8 +78,13 @@ absl::Status CheckNoneDamaged(const std::vector<DicomHeader>& files, const Dicom
   return absl::OkStatus();
 }
 
-// What an incomplete copy of a disc lacks; empty where nothing is missing.
+// What an incomplete copy of a disc or a repository lacks; empty where nothing is missing.
 std::string DescribeMissing(const DicomFolder& folder) {
+  if (folder.lfs_pointers > 0) {
+    return absl::StrCat(folder.lfs_pointers, " of ", folder.num_files,
+                        " files are git-LFS pointers, not the files themselves; run \"git lfs "
+                        "pull\" in their repository");
+  }
   if (folder.num_missing == 0) return "";
   return absl::StrCat("the DICOMDIR lists ", folder.num_missing,
                       folder.num_missing > 1 ? " files that are" : " file that is",
@@ -98,7 +103,8 @@ absl::Status WithSearch(const absl::Status& status, const DicomFolder& folder, i
     absl::StrAppend(&message, "; ", DescribeSearch(folder, max_depth),
                     "; or name the folder of one series");
   }
-  if (folder.num_missing > 0) absl::StrAppend(&message, "; ", DescribeMissing(folder));
+  const std::string missing = DescribeMissing(folder);
+  if (!missing.empty()) absl::StrAppend(&message, "; ", missing);
   return {status.code(), message};
 }
 
@@ -110,7 +116,8 @@ void AddFolderNotes(const DicomFolder& folder, int max_depth, int copies, DicomS
         number ? absl::StrCat("series ", *number) : "a series without number", stack->slices.size(),
         stack->spacing_mm[2]));
   }
-  if (folder.num_missing > 0) stack->notes.push_back(DescribeMissing(folder));
+  const std::string missing = DescribeMissing(folder);
+  if (!missing.empty()) stack->notes.push_back(missing);
   if (copies > 0) {
     stack->notes.push_back(absl::StrCat("ignored: ", copies, " files that are copies of others"));
   }

@@ -11,6 +11,8 @@
 
 #include "absl/strings/match.h"
 
+#include "core/base/lfs_pointer.h"
+
 namespace tissueform {
 namespace {
 
@@ -85,5 +87,12 @@ int64_t UnpackedSize(absl::string_view packed, int64_t enough) {
 }
 
 bool IsGzip(absl::string_view bytes) { return absl::StartsWith(bytes, "\x1f\x8b"); }
+
+bool IsLfsPointerFile(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::string start(kLfsPointerStart.size(), '\0');
+  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
+  return stream.good() && IsLfsPointer(start);
+}
 
 }  // namespace tissueform

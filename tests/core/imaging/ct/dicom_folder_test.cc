@@ -118,6 +118,18 @@ TEST_F(DicomFolderTest, FilesThatADirectoryListsAndThatAreMissingAreCounted) {
               Contains("the DICOMDIR lists 1 file that is missing: copy the whole disc"));
 }
 
+TEST_F(DicomFolderTest, FilesThatGitLfsHasNotFetchedAreNamed) {
+  const std::string pointer =
+      "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 1234567\n";
+  std::filesystem::create_directories(Path("study"));
+  for (const char* name : {"study/IM1", "study/IM2", "head.nii.gz", "head.nrrd"}) {
+    Write(name, pointer);
+  }
+  for (const char* name : {"study", "study/IM1", "head.nii.gz", "head.nrrd"}) {
+    EXPECT_THAT(Read({}, name), StatusIs(kInvalid, HasSubstr("run \"git lfs pull\""))) << name;
+  }
+}
+
 TEST_F(DicomFolderTest, SearchIsLimited) {
   WriteIn("1/2/3", Scan(4, "H30s", 9));
   std::filesystem::create_directory_symlink(Path(), Path("1/loop"));
