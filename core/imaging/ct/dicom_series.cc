@@ -349,6 +349,12 @@ void AddNotes(const Candidate& chosen, const std::vector<SliceGroup>& aside, Dic
   if (lossy > 0) {
     stack->notes.push_back(absl::StrCat(lossy, " slices were once compressed with loss"));
   }
+  if (stack->slices.front().even_frames) {
+    stack->notes.push_back(absl::StrCat(
+        "a multi-frame file without a position for each frame: its ", stack->slices.size(),
+        " frames are placed by SpacingBetweenSlices along the normal of the first, toward its "
+        "positive side; check that the head is not upside down"));
+  }
   if (chosen.group.num_series > 1) {
     stack->notes.push_back(absl::StrCat(
         stack->slices.size(), " slices of ", chosen.group.num_series,
