@@ -15,7 +15,9 @@ namespace tissueform {
 
 // Limits on what is read from outside. Defaults are told in docs/ct-input.md.
 struct CtReadLimits {
-  int max_files = 20000;                        // in the folder
+  int max_files = 20000;                        // in the folder, or in it and those below
+  int max_folders = 2000;                       // below the folder that are searched
+  int max_folder_depth = 8;                     // deeper folders are not searched
   int64_t max_file_bytes = int64_t{4} << 30;    // of all files that are read, together
   int64_t max_voxels = int64_t{1} << 30;        // of the volume
   int64_t max_memory_bytes = int64_t{8} << 30;  // of the process that reads
@@ -47,12 +49,12 @@ struct CtReadOptions {
   CtReadLimits limits;
 };
 
-// Reads a CT: a folder with a DICOM series or one file of it (then the series of that file), or a
-// file of NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr) or MetaImage (.mha, .mhd). Values are HU:
-// DICOM's rescale slope and intercept, or those of NIfTI, are applied, then `hu_offset`; values
-// under -1024 (outside the scanner's circle) become -1024. Places come from position and
-// orientation, never from the slice thickness. The libraries (ITK, GDCM) work in a helper program
-// within the limits. Any thread may call it.
+// Reads a CT: a folder with a DICOM series, in it or in the folders below (a CD, a study), or one
+// file of it (then the series of that file), or a file of NIfTI (.nii, .nii.gz), NRRD (.nrrd,
+// .nhdr) or MetaImage (.mha, .mhd). Values are HU: DICOM's rescale slope and intercept, or those of
+// NIfTI, are applied, then `hu_offset`; values under -1024 (outside the scanner's circle) become
+// -1024. Places come from position and orientation, never from the slice thickness. The libraries
+// (ITK, GDCM) work in a helper program within the limits. Any thread may call it.
 //
 // Errors: NotFound when there is no such path; ResourceExhausted beyond a limit; InvalidArgument
 // for everything that cannot be used as a CT volume, in one line: what was found, where, what to

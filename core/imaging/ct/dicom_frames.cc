@@ -4,9 +4,11 @@
 #include "core/imaging/ct/dicom_frames.h"
 
 #include <gdcmDataSet.h>
+#include <optional>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
 
 #include "core/imaging/ct/dicom_tags.h"
 
@@ -16,6 +18,8 @@ namespace {
 constexpr uint32_t kSharedGroups = 0x52009229;
 constexpr uint32_t kGroupsOfFrames = 0x52009230;
 constexpr uint32_t kNumberOfFrames = 0x00280008;
+constexpr uint32_t kSpacingBetweenSlices = 0x00180088;
+constexpr int kMaxFrames = 65535;  // of one file: more than any scanner writes
 
 // The macros of the functional groups that matter, and what stands in them.
 constexpr uint32_t kPlanePosition = 0x00209113;
@@ -70,6 +74,28 @@ void ReadValuesAndKind(const gdcm::DataSet& groups, DicomHeader* frame) {
   });
 }
 
+// Cone-beam devices write a whole volume into the plain CT class: position, orientation and spacing
+// of the first frame at the top level, and the frames follow along the normal.
+std::vector<DicomHeader> EvenFrames(const gdcm::DataSet& data, const DicomHeader& file) {
+  const int count = IntegerOf(data, kNumberOfFrames).value_or(0);
+  const std::optional<double> spacing_mm = NumberOf(data, kSpacingBetweenSlices);
+  if ((!file.class_uid.empty() && file.class_uid != kCtImageClass) || count < 2 ||
+      count > kMaxFrames || !file.position_mm || !file.axes || !spacing_mm || *spacing_mm == 0) {
+    return {};
+  }
+  DicomHeader frame = file;
+  frame.kind = DicomKind::kCtSlice;
+  frame.num_frames = count;
+  frame.even_frames = true;
+  const Eigen::Vector3d step_mm = *spacing_mm * SliceNormal(file).normalized();
+  std::vector<DicomHeader> frames(static_cast<size_t>(count), frame);
+  for (int i = 0; i < count; ++i) {
+    frames[static_cast<size_t>(i)].frame = i;
+    *frames[static_cast<size_t>(i)].position_mm += i * step_mm;
+  }
+  return frames;
+}
+
 void ReadGroups(const gdcm::DataSet& groups, DicomHeader* frame) {
   ReadGeometry(groups, frame);
   ReadValuesAndKind(groups, frame);
@@ -90,6 +116,7 @@ std::vector<DicomHeader> FramesOf(const gdcm::DataSet& data, const DicomHeader& 
     ReadGroups(groups, &frame);
     frames.push_back(std::move(frame));
   });
+  if (count == 0) return EvenFrames(data, file);
   // More or fewer groups than frames: nobody knows which place is whose.
   if (IntegerOf(data, kNumberOfFrames) != count) return {};
   for (DicomHeader& frame : frames) frame.num_frames = count;

@@ -148,6 +148,27 @@ absl::Status CannotDecode(const DicomHeader& header, absl::string_view why) {
       absl::StrCat(NameOf(header), " cannot be read: ", why, "; export the series again"));
 }
 
+// GDCM leaves the bits over BitsStored zero in what these decode to, also where values are
+// negative.
+bool LosesSign(const gdcm::TransferSyntax& syntax) {
+  return syntax == gdcm::TransferSyntax::JPEGLSLossless ||
+         syntax == gdcm::TransferSyntax::JPEGLSNearLossless ||
+         syntax == gdcm::TransferSyntax::JPEG2000Lossless ||
+         syntax == gdcm::TransferSyntax::JPEG2000;
+}
+
+// Two's complement of the lowest `bits` of each value; others are as they should be already.
+template <typename T>
+void ExtendSign(int bits, std::vector<T>* values) {
+  constexpr int kBits = 8 * static_cast<int>(sizeof(T));
+  if (bits < 1 || bits >= kBits) return;
+  using Unsigned = std::make_unsigned_t<T>;
+  for (T& value : *values) {
+    const auto raised = static_cast<Unsigned>(static_cast<Unsigned>(value) << (kBits - bits));
+    value = static_cast<T>(static_cast<T>(raised) >> (kBits - bits));
+  }
+}
+
 template <typename T>
 absl::StatusOr<std::vector<float>> ValuesOf(const DicomHeader& header, const gdcm::Image& image) {
   const size_t count = static_cast<size_t>(header.rows) * static_cast<size_t>(header.columns) *
@@ -158,6 +179,11 @@ absl::StatusOr<std::vector<float>> ValuesOf(const DicomHeader& header, const gdc
   std::vector<T> values(count);
   if (!image.GetBuffer(reinterpret_cast<char*>(values.data()))) {
     return CannotDecode(header, "its pixels are truncated or damaged");
+  }
+  if constexpr (std::is_signed_v<T>) {
+    if (LosesSign(image.GetTransferSyntax())) {
+      ExtendSign(image.GetPixelFormat().GetBitsStored(), &values);
+    }
   }
   return std::vector<float>(values.begin(), values.end());
 }

@@ -41,6 +41,7 @@ struct DicomHeader : ImageHeader {
   DicomKind kind = DicomKind::kNoImage;
   int frame = 0;  // of the file's images, from 0
   int num_frames = 1;
+  bool even_frames = false;  // placed by SpacingBetweenSlices, as the file has no place for each
 
   std::string patient;
   std::string patient_position;              // "HFS"

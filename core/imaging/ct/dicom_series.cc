@@ -136,8 +136,8 @@ std::vector<SliceGroup> GroupsOf(const std::vector<Candidate>& candidates) {
 absl::Status NoneWanted(const std::vector<SliceGroup>& all, const SeriesChoice& choice) {
   if (all.empty()) {
     return absl::InvalidArgumentError(
-        "the folder holds no DICOM images, only a directory of them (DICOMDIR); name the folder "
-        "that holds the CT series");
+        "the folder holds no DICOM images, only a directory of them (DICOMDIR); copy the whole "
+        "disc, or name the folder that holds the CT series");
   }
   if (choice.series_number) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -348,6 +348,12 @@ void AddNotes(const Candidate& chosen, const std::vector<SliceGroup>& aside, Dic
                                    [](const DicomHeader& slice) { return slice.was_lossy; });
   if (lossy > 0) {
     stack->notes.push_back(absl::StrCat(lossy, " slices were once compressed with loss"));
+  }
+  if (stack->slices.front().even_frames) {
+    stack->notes.push_back(absl::StrCat(
+        "a multi-frame file without a position for each frame: its ", stack->slices.size(),
+        " frames are placed by SpacingBetweenSlices along the normal of the first, toward its "
+        "positive side; check that the head is not upside down"));
   }
   if (chosen.group.num_series > 1) {
     stack->notes.push_back(absl::StrCat(

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -78,12 +80,32 @@ absl::Status CheckAlike(const std::vector<DicomHeader>& slices) {
     if (!slice.pixel_spacing_mm->isApprox(*first.pixel_spacing_mm, kSameDirection)) {
       return Differs(slice, first, "pixel spacing");
     }
-    if (slice.rescale_slope != first.rescale_slope ||
-        slice.rescale_intercept != first.rescale_intercept) {
-      return Differs(slice, first, "how values become HU (RescaleSlope, RescaleIntercept)");
-    }
   }
   return absl::OkStatus();
+}
+
+std::pair<double, double> RescaleOf(const DicomHeader& slice) {
+  return {slice.rescale_slope.value_or(1), slice.rescale_intercept.value_or(0)};
+}
+
+// DICOM states the rescale of each slice, and some exports vary it.
+void NoteRescale(DicomStack* stack) {
+  std::map<std::pair<double, double>, int> count;
+  for (const DicomHeader& slice : stack->slices) ++count[RescaleOf(slice)];
+  if (count.size() == 1) return;
+  const auto usual = std::max_element(
+      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  double low = usual->first.second;
+  double high = low;
+  for (const auto& [rescale, slices] : count) {
+    low = std::min(low, rescale.second);
+    high = std::max(high, rescale.second);
+  }
+  stack->notes.push_back(absl::StrCat(
+      "the rescale differs between the slices: each slice is converted to HU by its own (usually "
+      "RescaleIntercept ",
+      usual->first.second, " and RescaleSlope ", usual->first.first, ", in ", usual->second, " of ",
+      stack->slices.size(), " slices; RescaleIntercept ", low, " to ", high, ")"));
 }
 
 absl::Status CheckPlane(const DicomHeader& slice) {
@@ -237,6 +259,7 @@ absl::Status ArrangeStack(bool has_offset, DicomStack* stack) {
   std::vector<DicomHeader>& slices = stack->slices;
   TF_RETURN_IF_ERROR(CheckTags(slices, has_offset));
   TF_RETURN_IF_ERROR(CheckAlike(slices));
+  NoteRescale(stack);
   TF_RETURN_IF_ERROR(CheckPlane(slices.front()));
   if (slices.size() < kLeastSlices) {
     return absl::InvalidArgumentError(absl::StrCat(

@@ -24,11 +24,11 @@ struct DicomStack {
   std::vector<std::string> notes;
 };
 
-// Sorts the slices of a chosen series and finds their geometry from positions and orientation. A
-// note says when slices are missing or lie unevenly.
+// Sorts the slices of a chosen series and finds their geometry from positions and orientation.
+// Notes say when slices are missing or lie unevenly, and when their rescale differs.
 //
 // Errors: InvalidArgument, naming the slice, when a tag is missing; when slices differ in size,
-// orientation, pixel spacing or rescale; when there are too few, or two at one place; when a gap,
+// orientation or pixel spacing; when there are too few, or two at one place; when a gap,
 // the spacing or the tilt is absurd. `has_offset` says that the recipe states how values become HU,
 // so that rescale tags may be missing.
 absl::Status ArrangeStack(bool has_offset, DicomStack* stack);

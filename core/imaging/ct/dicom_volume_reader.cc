@@ -11,8 +11,10 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
 #include "core/base/status_macros.h"
+#include "core/imaging/ct/dicom_folder.h"
 #include "core/imaging/ct/dicom_header.h"
 #include "core/imaging/ct/dicom_series.h"
 #include "core/imaging/ct/file_bytes.h"
@@ -23,49 +25,7 @@
 namespace tissueform {
 namespace {
 
-absl::StatusOr<std::vector<std::string>> FilesIn(const std::string& folder, int max_files) {
-  std::vector<std::string> paths;
-  int num_folders = 0;
-  std::error_code error;  // exceptions of the file system hold paths
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    num_folders += entry->is_directory(error) ? 1 : 0;
-    if (entry->is_regular_file(error)) paths.push_back(entry->path().string());
-    if (static_cast<int>(paths.size()) > max_files) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("the folder holds more than ", max_files, " files"));
-    }
-  }
-  if (error) return absl::InvalidArgumentError("the folder cannot be opened");
-  if (paths.empty()) {
-    return absl::InvalidArgumentError(
-        num_folders == 0 ? "the folder is empty; name the folder that holds the CT series"
-                         : absl::StrCat("the folder holds no files but ", num_folders,
-                                        " folders; name the one that holds the CT series"));
-  }
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
-struct Folder {
-  std::vector<DicomHeader> files;
-  int others = 0;
-};
-
-Folder ReadHeaders(const std::vector<std::string>& paths) {
-  Folder folder;
-  for (size_t i = 0; i < paths.size(); ++i) {
-    std::vector<DicomHeader> headers = ReadDicomHeaders(paths[i]);
-    folder.others += headers.empty() ? 1 : 0;
-    for (DicomHeader& header : headers) {
-      header.file_number = static_cast<int>(i) + 1;
-      folder.files.push_back(std::move(header));
-    }
-  }
-  return folder;
-}
-
-absl::StatusOr<SeriesChoice> ChoiceOf(const std::string& path, const Folder& folder,
+absl::StatusOr<SeriesChoice> ChoiceOf(const std::string& path, const DicomFolder& folder,
                                       const CtReadOptions& options) {
   if (std::filesystem::is_directory(path)) {
     return SeriesChoice{0, options.series_number, options.join_series,
@@ -118,21 +78,73 @@ absl::Status CheckNoneDamaged(const std::vector<DicomHeader>& files, const Dicom
   return absl::OkStatus();
 }
 
+// What an incomplete copy of a disc or a repository lacks; empty where nothing is missing.
+std::string DescribeMissing(const DicomFolder& folder) {
+  if (folder.lfs_pointers > 0) {
+    return absl::StrCat(folder.lfs_pointers, " of ", folder.num_files,
+                        " files are git-LFS pointers, not the files themselves; run \"git lfs "
+                        "pull\" in their repository");
+  }
+  if (folder.num_missing == 0) return "";
+  return absl::StrCat("the DICOMDIR lists ", folder.num_missing,
+                      folder.num_missing > 1 ? " files that are" : " file that is",
+                      " missing: copy the whole disc");
+}
+
+std::string DescribeSearch(const DicomFolder& folder, int max_depth) {
+  return absl::StrCat("searched ", folder.num_files, " files and ", folder.num_folders,
+                      folder.num_folders > 1 ? " folders" : " folder", " below the given one",
+                      folder.too_deep ? absl::StrCat(", to a depth of ", max_depth) : "");
+}
+
+absl::Status WithSearch(const absl::Status& status, const DicomFolder& folder, int max_depth) {
+  std::string message(status.message());
+  if (folder.num_folders > 0) {
+    absl::StrAppend(&message, "; ", DescribeSearch(folder, max_depth),
+                    "; or name the folder of one series");
+  }
+  const std::string missing = DescribeMissing(folder);
+  if (!missing.empty()) absl::StrAppend(&message, "; ", missing);
+  return {status.code(), message};
+}
+
+void AddFolderNotes(const DicomFolder& folder, int max_depth, int copies, DicomStack* stack) {
+  if (folder.num_folders > 0) {
+    const std::optional<int> number = stack->slices.front().series_number;
+    stack->notes.push_back(absl::StrFormat(
+        "%s; the CT is %s (%d slices, %.2f mm apart)", DescribeSearch(folder, max_depth),
+        number ? absl::StrCat("series ", *number) : "a series without number", stack->slices.size(),
+        stack->spacing_mm[2]));
+  }
+  const std::string missing = DescribeMissing(folder);
+  if (!missing.empty()) stack->notes.push_back(missing);
+  if (copies > 0) {
+    stack->notes.push_back(absl::StrCat("ignored: ", copies, " files that are copies of others"));
+  }
+  if (folder.others > 0) {
+    stack->notes.push_back(absl::StrCat("ignored: ", folder.others, " files that are not DICOM"));
+  }
+}
+
 absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOptions& options) {
   const std::filesystem::path place(path);
   const bool is_folder = std::filesystem::is_directory(place);
   const std::string folder_path = is_folder ? path : place.parent_path().string();
-  TF_ASSIGN_OR_RETURN(const std::vector<std::string> paths,
-                      FilesIn(folder_path, options.limits.max_files));
-  Folder folder = ReadHeaders(paths);
+  const int max_depth = options.limits.max_folder_depth;
+  TF_ASSIGN_OR_RETURN(
+      DicomFolder folder,
+      ReadDicomFolder(folder_path, is_folder ? FoldersBelow::kWithoutCt : FoldersBelow::kNever,
+                      options.limits));
   TF_ASSIGN_OR_RETURN(const SeriesChoice choice, ChoiceOf(path, folder, options));
   if (folder.files.empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("none of the ", folder.others, " files in the folder is a DICOM file"));
+    return WithSearch(absl::InvalidArgumentError(absl::StrCat(
+                          "none of the ", folder.others, " files in the folder is a DICOM file")),
+                      folder, max_depth);
   }
   const int copies = DropCopies(options.limits.max_file_bytes, &folder.files);
-  TF_ASSIGN_OR_RETURN(DicomStack stack, ChooseSeries(folder.files, choice));
-  const absl::Status arranged = ArrangeStack(options.hu_offset.has_value(), &stack);
+  absl::StatusOr<DicomStack> stack = ChooseSeries(folder.files, choice);
+  if (!stack.ok()) return WithSearch(stack.status(), folder, max_depth);
+  const absl::Status arranged = ArrangeStack(options.hu_offset.has_value(), &*stack);
   if (!arranged.ok() && options.join_series == JoinSeries::kAlways) {
     return absl::Status(arranged.code(),
                         absl::StrCat(arranged.message(),
@@ -140,13 +152,8 @@ absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOption
                                      "recipe, so that scans are separated"));
   }
   TF_RETURN_IF_ERROR(arranged);
-  TF_RETURN_IF_ERROR(CheckNoneDamaged(folder.files, stack));
-  if (copies > 0) {
-    stack.notes.push_back(absl::StrCat("ignored: ", copies, " files that are copies of others"));
-  }
-  if (folder.others > 0) {
-    stack.notes.push_back(absl::StrCat("ignored: ", folder.others, " files that are not DICOM"));
-  }
+  TF_RETURN_IF_ERROR(CheckNoneDamaged(folder.files, *stack));
+  AddFolderNotes(folder, max_depth, copies, &*stack);
   return stack;
 }
 

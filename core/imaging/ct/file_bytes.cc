@@ -11,6 +11,8 @@
 
 #include "absl/strings/match.h"
 
+#include "core/base/lfs_pointer.h"
+
 namespace tissueform {
 namespace {
 
@@ -85,5 +87,29 @@ int64_t UnpackedSize(absl::string_view packed, int64_t enough) {
 }
 
 bool IsGzip(absl::string_view bytes) { return absl::StartsWith(bytes, "\x1f\x8b"); }
+
+std::string UnpackedStart(absl::string_view contents, size_t count) {
+  if (!IsGzip(contents)) return std::string(contents.substr(0, count));
+  std::string start(count, '\0');
+  z_stream stream{};
+  if (inflateInit2(&stream, kGzipOrZlib) != Z_OK) return "";
+  const absl::string_view packed = contents.substr(0, kChunk);  // its header is much shorter
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
+  stream.avail_in = static_cast<uInt>(packed.size());
+  stream.next_out = reinterpret_cast<Bytef*>(start.data());
+  stream.avail_out = static_cast<uInt>(start.size());
+  const int result = inflate(&stream, Z_SYNC_FLUSH);
+  inflateEnd(&stream);
+  const bool is_usable = result == Z_OK || result == Z_STREAM_END || result == Z_BUF_ERROR;
+  start.resize(is_usable ? count - stream.avail_out : 0);
+  return start;
+}
+
+bool IsLfsPointerFile(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::string start(kLfsPointerStart.size(), '\0');
+  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
+  return stream.good() && IsLfsPointer(start);
+}
 
 }  // namespace tissueform

@@ -20,6 +20,12 @@ absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* byte
 // pass over what is missing. Internal to core/imaging/ct.
 int64_t UnpackedSize(absl::string_view packed, int64_t enough);
 
+// The first bytes of `contents`, unpacked where they are gzip; fewer if there are not so many.
+std::string UnpackedStart(absl::string_view contents, size_t count);
+
+// Whether the file is a git-LFS pointer (core/base/lfs_pointer.h).
+bool IsLfsPointerFile(const std::string& path);
+
 // Whether they begin as gzip does.
 bool IsGzip(absl::string_view bytes);
 

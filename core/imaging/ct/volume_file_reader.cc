@@ -3,23 +3,22 @@
 
 #include "core/imaging/ct/volume_file_reader.h"
 
-#include <array>
 #include <cmath>
 #include <itkImage.h>
 #include <itkImageFileReader.h>
-#include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
+#include <optional>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
 #include "core/imaging/ct/file_bytes.h"
 #include "core/imaging/ct/hu_check.h"
+#include "core/imaging/ct/nifti_header.h"
 #include "core/imaging/ct/patient_axes.h"
 #include "core/mesh/payload/sha256.h"
 
@@ -44,10 +43,32 @@ const char* NameOf(VolumeFormat format) {
   return "";
 }
 
+// ITK's reader of NIfTI, which also reads the voxels of a file whose axes are not square to each
+// other. Their directions are then those of the header (nifti_header.h).
+class NiftiIo : public itk::NiftiImageIO {
+ public:
+  using Self = NiftiIo;
+  using Pointer = itk::SmartPointer<Self>;
+  itkFactorylessNewMacro(Self);
+
+  void ReadImageInformation() override {
+    try {
+      NiftiImageIO::ReadImageInformation();
+    } catch (const itk::ExceptionObject& exception) {
+      if (!absl::StrContains(exception.GetDescription(), "rthonormal")) throw;
+      axes_are_square_ = false;
+    }
+  }
+  bool AxesAreSquare() const { return axes_are_square_; }
+
+ private:
+  bool axes_are_square_ = true;
+};
+
 itk::ImageIOBase::Pointer MakeIo(VolumeFormat format) {
   switch (format) {
     case VolumeFormat::kNifti:
-      return itk::NiftiImageIO::New().GetPointer();
+      return NiftiIo::New().GetPointer();
     case VolumeFormat::kNrrd:
       return itk::NrrdImageIO::New().GetPointer();
     case VolumeFormat::kMetaImage:
@@ -62,10 +83,6 @@ absl::Status Damaged() {
 
 // ITK's messages hold paths, and several lines.
 absl::Status ExplainFailure(const itk::ExceptionObject& exception) {
-  if (absl::StrContains(exception.GetDescription(), "rthonormal")) {
-    return absl::InvalidArgumentError(
-        "the file's axes are not square to each other; resample it upright");
-  }
   if (absl::StrContains(exception.GetDescription(), "nrrdSpacingStatusScalarWithSpace")) {
     return absl::InvalidArgumentError(
         "the header has \"spacings\" beside a \"space\", which needs \"space directions\"; take "
@@ -103,22 +120,14 @@ CtProvenance ProvenanceOf(VolumeFormat format, const VolumeHeader& header,
   return provenance;
 }
 
-std::string MetaDataOf(const itk::ImageIOBase& io, const char* key) {
-  std::string value;
-  itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), key, value);
-  return value;
-}
-
-bool HoldsAllOfNifti(const std::string& file, const itk::ImageIOBase& io) {
-  double voxel_offset = 0;
-  double voxel_bits = 0;  // in the file: ITK tells of those after scaling
-  if (!absl::SimpleAtod(MetaDataOf(io, "vox_offset"), &voxel_offset) ||
-      !absl::SimpleAtod(MetaDataOf(io, "bitpix"), &voxel_bits)) {
-    return false;
-  }
-  const auto bytes = static_cast<int64_t>(
-      voxel_offset + static_cast<double>(io.GetImageSizeInPixels()) * voxel_bits / 8);
-  return (IsGzip(file) ? UnpackedSize(file, bytes) : static_cast<int64_t>(file.size())) >= bytes;
+bool HoldsAllOfNifti(const std::string& file, const NiftiHeader& header,
+                     const itk::ImageIOBase& io) {
+  // The bits in the file: ITK reports those after scaling.
+  const double bytes = header.voxel_offset + static_cast<double>(io.GetImageSizeInPixels()) *
+                                                 static_cast<double>(header.voxel_bits) / 8;
+  if (!(header.voxel_offset >= 0 && header.voxel_bits > 0 && bytes < 1e15)) return false;
+  const auto needed = static_cast<int64_t>(bytes);
+  return (IsGzip(file) ? UnpackedSize(file, needed) : static_cast<int64_t>(file.size())) >= needed;
 }
 
 bool HoldsAllOfMetaImage(const VolumeHeader& header, const FileContents& contents,
@@ -137,10 +146,10 @@ bool HoldsAllOfMetaImage(const VolumeHeader& header, const FileContents& content
 // ITK fills up with anything what is missing from NIfTI and MetaImage: so the bytes are counted
 // against the header before ITK reads them.
 bool HoldsAllVoxels(VolumeFormat format, const VolumeHeader& header, const FileContents& contents,
-                    const itk::ImageIOBase& io) {
+                    const std::optional<NiftiHeader>& nifti, const itk::ImageIOBase& io) {
   switch (format) {
     case VolumeFormat::kNifti:
-      return HoldsAllOfNifti(contents.file, io);
+      return nifti && HoldsAllOfNifti(contents.file, *nifti, io);
     case VolumeFormat::kMetaImage:
       return HoldsAllOfMetaImage(header, contents, io);
     case VolumeFormat::kNrrd:
@@ -149,23 +158,17 @@ bool HoldsAllVoxels(VolumeFormat format, const VolumeHeader& header, const FileC
   return false;
 }
 
-bool IsPositiveCode(const itk::ImageIOBase& io, const char* key) {
-  const std::string value = MetaDataOf(io, key);
-  return !value.empty() && value != "0";
-}
-
 struct Orientation {
   bool stated = false;
   std::string where;  // what is there instead
 };
 
 Orientation OrientationOf(VolumeFormat format, const VolumeHeader& header,
-                          const itk::ImageIOBase& io) {
+                          const std::optional<NiftiHeader>& nifti) {
   const std::string quoted = absl::StrCat("\"", header.orientation.substr(0, 40), "\"");
   switch (format) {
     case VolumeFormat::kNifti:
-      return {IsPositiveCode(io, "qform_code") || IsPositiveCode(io, "sform_code"),
-              "NIfTI with qform_code and sform_code 0"};
+      return {nifti && nifti->StatesPlace(), "NIfTI with qform_code and sform_code 0"};
     case VolumeFormat::kNrrd: {
       const std::string space = absl::AsciiStrToLower(header.orientation);
       const bool stated = space == "left-posterior-superior" || space == "lps" ||
@@ -212,22 +215,36 @@ absl::Status CheckShape(const itk::ImageIOBase& io, const CtReadLimits& limits) 
   return absl::OkStatus();
 }
 
-absl::Status TakeGeometry(const Image& image, CtVolume* volume) {
+void TakeGeometry(const Image& image, CtVolume* volume) {
   for (unsigned axis = 0; axis < 3; ++axis) {
-    const double spacing = image.GetSpacing()[axis];
-    if (!(spacing >= kLeastSpacingMm && spacing <= kMaxSpacingMm)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("the voxels are ", spacing, " mm apart along axis ", axis + 1, "; between ",
-                       kLeastSpacingMm, " and ", kMaxSpacingMm, " mm are read"));
-    }
     volume->size[axis] = static_cast<int>(image.GetLargestPossibleRegion().GetSize()[axis]);
-    volume->spacing_mm[axis] = spacing;
+    volume->spacing_mm[axis] = image.GetSpacing()[axis];
     volume->origin_mm[axis] = image.GetOrigin()[axis];
     for (unsigned row = 0; row < 3; ++row) {
       volume->direction(row, axis) = image.GetDirection()(row, axis);
     }
   }
-  if (!volume->origin_mm.allFinite() || !volume->direction.allFinite()) {
+}
+
+// Where ITK does not place the volume as the header says.
+absl::Status CorrectGeometry(const NiftiHeader& nifti, const itk::ImageIOBase& io,
+                             CtVolume* volume) {
+  TF_RETURN_IF_ERROR(CheckForms(nifti));
+  const bool is_right = dynamic_cast<const NiftiIo&>(io).AxesAreSquare() && !nifti.NeedsScale();
+  return is_right || !nifti.StatesPlace() ? absl::OkStatus() : PlaceByHeader(nifti, volume);
+}
+
+absl::Status CheckGeometry(const CtVolume& volume, bool scaled) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double spacing = volume.spacing_mm[axis];
+    if (spacing >= kLeastSpacingMm && spacing <= kMaxSpacingMm) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the voxels are ", spacing, " mm apart along axis ", axis + 1, "; between ",
+        kLeastSpacingMm, " and ", kMaxSpacingMm, " mm are read",
+        scaled ? "; the file does not state millimeters: if it has them, set xyzt_units to 2"
+               : ""));
+  }
+  if (!volume.origin_mm.allFinite() || !volume.direction.allFinite()) {
     return absl::InvalidArgumentError("the file places its voxels at no finite position");
   }
   return absl::OkStatus();
@@ -254,14 +271,21 @@ absl::StatusOr<CtVolume> ReadWithItk(const std::string& path, VolumeFormat forma
   io->SetFileName(path);
   io->ReadImageInformation();
   TF_RETURN_IF_ERROR(CheckShape(*io, options.limits));
-  if (!HoldsAllVoxels(format, header, contents, *io)) return Damaged();
+  std::optional<NiftiHeader> nifti;
+  if (format == VolumeFormat::kNifti) {
+    nifti = ParseNiftiHeader(UnpackedStart(contents.file, kNiftiHeaderBytes));
+  }
+  if (!HoldsAllVoxels(format, header, contents, nifti, *io)) return Damaged();
   const auto reader = itk::ImageFileReader<Image>::New();
   reader->SetImageIO(io);
   reader->SetFileName(path);
   reader->Update();
   CtVolume volume;
-  TF_RETURN_IF_ERROR(TakeGeometry(*reader->GetOutput(), &volume));
-  const Orientation orientation = OrientationOf(format, header, *io);
+  volume.provenance = ProvenanceOf(format, header, contents);
+  TakeGeometry(*reader->GetOutput(), &volume);
+  if (nifti) TF_RETURN_IF_ERROR(CorrectGeometry(*nifti, *io, &volume));
+  TF_RETURN_IF_ERROR(CheckGeometry(volume, nifti && nifti->NeedsScale()));
+  const Orientation orientation = OrientationOf(format, header, nifti);
   TF_RETURN_IF_ERROR(PlaceVolume(orientation.stated, orientation.where, options.axes, &volume));
   TF_RETURN_IF_ERROR(TakeValues(*reader->GetOutput(), options.hu_offset.value_or(0), &volume));
   return volume;
@@ -275,9 +299,7 @@ absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat fo
   TF_ASSIGN_OR_RETURN(const FileContents contents,
                       ReadContents(path, header, options.limits.max_file_bytes));
   try {
-    TF_ASSIGN_OR_RETURN(CtVolume volume, ReadWithItk(path, format, header, contents, options));
-    volume.provenance = ProvenanceOf(format, header, contents);
-    return volume;
+    return ReadWithItk(path, format, header, contents, options);
   } catch (const itk::ExceptionObject& exception) {
     return ExplainFailure(exception);
   }

@@ -11,8 +11,11 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+
+#include "core/base/lfs_pointer.h"
 
 namespace tissueform {
 namespace {
@@ -81,6 +84,16 @@ bool IsCount(absl::string_view word) {
   });
 }
 
+// "1 0.25 3.5 ...": a node, where TetGen has counts first.
+bool IsNodeLine(absl::string_view text) {
+  text = text.substr(0, text.find('\n'));
+  const absl::string_view first = FirstWord(text);
+  const absl::string_view second =
+      FirstWord(absl::StripLeadingAsciiWhitespace(text.substr(first.size())));
+  double number = 0;
+  return IsCount(first) && !IsCount(second) && absl::SimpleAtod(second, &number);
+}
+
 // What the first characters tell; for XML the one of the two that its type says, .vtu by default.
 std::optional<MeshFormat> FormatOfStart(absl::string_view start) {
   if (absl::StartsWith(start, "\xEF\xBB\xBF")) start.remove_prefix(3);
@@ -99,8 +112,13 @@ std::optional<MeshFormat> FormatOfStart(absl::string_view start) {
   if (absl::EqualsIgnoreCase(word, "solid")) return MeshFormat::kStl;
   if (IsOffWord(word)) return MeshFormat::kOff;
   if (IsObjWord(word)) return MeshFormat::kObj;
-  if (IsCount(word)) return MeshFormat::kTetgen;
+  if (IsCount(word) && !IsNodeLine(text)) return MeshFormat::kTetgen;
   return std::nullopt;
+}
+
+// VTK's two formats of a mesh of tets, which are often saved under each other's ending.
+bool IsTetGrid(MeshFormat format) {
+  return format == MeshFormat::kVtu || format == MeshFormat::kLegacyVtk;
 }
 
 absl::string_view LastLine(absl::string_view end) {
@@ -122,11 +140,42 @@ bool LooksLike(MeshFormat format, const Sample& sample, int64_t bytes) {
   return FormatOfStart(sample.start) == format;
 }
 
+// "$EndElements" after binary data, with or without a line break between; which section is the last
+// one is free. Text that goes on after the mark is left to Gmsh.
+bool EndsLikeGmsh(absl::string_view end) {
+  if (absl::StartsWithIgnoreCase(LastLine(end), "$End")) return true;
+  end = absl::StripTrailingAsciiWhitespace(end);
+  const size_t mark = end.rfind("$End");
+  return mark != end.npos &&
+         std::all_of(end.begin() + static_cast<std::ptrdiff_t>(mark) + 1, end.end(),
+                     [](char c) { return absl::ascii_isalpha(static_cast<unsigned char>(c)); });
+}
+
+// Files that are refused under any ending, and why; empty for all others.
+absl::string_view WhyNotAMesh(absl::string_view start) {
+  if (IsLfsPointer(start)) return kLfsPointerMessage;
+  if (absl::StartsWith(start, "MFEM ")) {
+    return "it is an MFEM mesh; save it from MFEM as .vtu or Gmsh (.msh)";
+  }
+  // The number 1 in either byte order, and one of the versions 1 to 4.
+  constexpr absl::string_view kLittle("\1\0\0\0", 4);
+  constexpr absl::string_view kBig("\0\0\0\1", 4);
+  if (start.size() >= 8 && ((absl::StartsWith(start, kLittle) && start[4] >= 1 && start[4] <= 4) ||
+                            (absl::StartsWith(start, kBig) && start[7] >= 1 && start[7] <= 4))) {
+    return kBinaryMeditMessage;
+  }
+  if (IsNodeLine(SkipComments(start)) || absl::StartsWith(start, "/COM") ||
+      absl::StartsWith(start, "/PREP7")) {
+    return "it is an ANSYS file: its first line is a node or a command, not the counts of TetGen; "
+           "save the mesh as .vtu or Gmsh (.msh)";
+  }
+  return "";
+}
+
 absl::string_view MissingEnd(MeshFormat format, const Sample& sample, int64_t bytes) {
   switch (format) {
     case MeshFormat::kGmsh:
-      // Which section is the last one is free.
-      if (absl::StartsWithIgnoreCase(LastLine(sample.end), "$End")) return "";
+      if (EndsLikeGmsh(sample.end)) return "";
       return absl::StartsWith(sample.start, kGmsh1Start) ? "$ENDELM" : "$End...";
     case MeshFormat::kMedit:
       return LastLine(sample.end) == "End" ? "" : "End";
@@ -172,18 +221,23 @@ absl::StatusOr<Sample> TakeSample(const std::string& path, int64_t bytes) {
 
 }  // namespace
 
-absl::Status CheckSignature(const std::string& path, int64_t bytes, MeshFormat format) {
+absl::StatusOr<MeshFormat> CheckSignature(const std::string& path, int64_t bytes,
+                                          MeshFormat format) {
   if (bytes == 0) return CannotReadMesh(path, "it is empty");
   const absl::StatusOr<Sample> sample = TakeSample(path, bytes);
   if (!sample.ok()) return sample.status();
+  const std::optional<MeshFormat> found = FormatOfStart(sample->start);
+  if (IsTetGrid(format) && found && IsTetGrid(*found)) format = *found;
   if (!LooksLike(format, *sample, bytes)) {
-    return WrongStart(path, *sample, bytes, LookOf(format));
+    const absl::string_view why = WhyNotAMesh(sample->start);
+    return why.empty() ? WrongStart(path, *sample, bytes, LookOf(format))
+                       : CannotReadMesh(path, why);
   }
   if (const absl::string_view end = MissingEnd(format, *sample, bytes); !end.empty()) {
     return CannotReadMesh(path,
                           absl::StrCat("it does not end with \"", end, "\"; it is truncated"));
   }
-  return absl::OkStatus();
+  return format;
 }
 
 }  // namespace tissueform

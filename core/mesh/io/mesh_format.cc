@@ -59,6 +59,7 @@ std::string EndingsOf(MeshKind kind) {
 }
 
 absl::Status UnknownEnding(const std::string& path) {
+  if (LowerEnding(path) == ".meshb") return CannotReadMesh(path, kBinaryMeditMessage);
   return CannotReadMesh(path, absl::StrCat("its ending is not one of the supported ones: ",
                                            EndingsOf(MeshKind::kTets), " (tets), ",
                                            EndingsOf(MeshKind::kTriangles), " (surfaces)"));
@@ -108,12 +109,12 @@ absl::StatusOr<int64_t> SizeOfFile(const std::string& path) {
   return bytes;
 }
 
-absl::StatusOr<int64_t> CheckOneFile(const std::string& path, MeshFormat format,
-                                     const MeshReadLimits& limits) {
+absl::StatusOr<CheckedMeshFile> CheckOneFile(const std::string& path, MeshFormat format,
+                                             const MeshReadLimits& limits) {
   TF_ASSIGN_OR_RETURN(const int64_t bytes, SizeOfFile(path));
   TF_RETURN_IF_ERROR(CheckSize(path, bytes, format, limits));
-  TF_RETURN_IF_ERROR(CheckSignature(path, bytes, format));
-  return bytes;
+  TF_ASSIGN_OR_RETURN(const MeshFormat found, CheckSignature(path, bytes, format));
+  return CheckedMeshFile{path, found, bytes};
 }
 
 }  // namespace
@@ -143,12 +144,11 @@ absl::StatusOr<CheckedMeshFile> CheckMeshFile(const std::string& path, MeshKind 
   const Ending* const ending = FindEnding(path);
   if (ending == nullptr) return UnknownEnding(path);
   if (ending->kind != kind) return WrongKind(path, kind);
-  CheckedMeshFile file{path, ending->format, 0};
-  TF_ASSIGN_OR_RETURN(file.bytes, CheckOneFile(path, file.format, limits));
+  TF_ASSIGN_OR_RETURN(CheckedMeshFile file, CheckOneFile(path, ending->format, limits));
   if (file.format == MeshFormat::kTetgen) {
-    TF_ASSIGN_OR_RETURN(const int64_t partner_bytes,
+    TF_ASSIGN_OR_RETURN(const CheckedMeshFile partner,
                         CheckOneFile(TetgenPartner(path), file.format, limits));
-    file.bytes += partner_bytes;
+    file.bytes += partner.bytes;
   }
   return file;
 }

@@ -19,9 +19,10 @@ enum class MeshKind { kTets, kTriangles };
 // The surface format that the ending of `path` names; InvalidArgument for any other ending.
 absl::StatusOr<MeshFormat> SurfaceFormatOfPath(const std::string& path);
 
-// Finds the format by the ending, in any case, and checks what can be told without a library: the
-// file is there, is a file, is within the limits, begins as its format does and, where the format
-// has an end mark, ends with it. For TetGen's pairs `path` may name either file.
+// Finds the format by the ending, in any case (VTK's two formats for tets by content), and checks
+// what can be told without a library: the file is there, is a file, is within the limits, begins as
+// its format does and, where the format has an end mark, ends with it. For TetGen's pairs `path`
+// may name either file.
 //
 // Errors: NotFound, PermissionDenied, ResourceExhausted (over a limit), InvalidArgument (another
 // kind of mesh, another format behind the ending, truncated). Messages name the file.

@@ -4,9 +4,12 @@
 // Slices as hospitals' archives store them. GDCM compresses them here and decompresses them in the
 // reader; the phantom's values are the oracle.
 
+#include <fstream>
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmImageWriter.h>
+#include <iterator>
+#include <string_view>
 
 #include "tests/core/imaging/ct/ct_folder.h"
 
@@ -23,6 +26,9 @@ using tissueform::testing::PhantomSeries;
 using tissueform::testing::StatusIs;
 using tissueform::testing::WorstPhantomError;
 
+constexpr uint32_t kBitsStored = 0x00280101;
+constexpr uint32_t kHighBit = 0x00280102;
+
 struct Syntax {
   const char* name;
   gdcm::TransferSyntax::TSType type;
@@ -32,6 +38,10 @@ class TransferSyntaxTest : public CtFolder {
  protected:
   void WriteIn(gdcm::TransferSyntax::TSType type) const {
     WriteSeries(PhantomSeries({.columns = 64, .rows = 60}));
+    Compress(type);
+  }
+
+  void Compress(gdcm::TransferSyntax::TSType type) const {
     for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
       const std::string path = entry.path().string();
       gdcm::ImageReader reader;
@@ -46,6 +56,19 @@ class TransferSyntaxTest : public CtFolder {
       writer.SetImage(change.GetOutput());
       writer.SetFileName(path.c_str());
       ASSERT_TRUE(writer.Write());
+    }
+  }
+
+  // Sets PixelRepresentation of all files to 1.
+  void CallPixelsSigned() const {
+    constexpr std::string_view kUnsigned("\x28\0\x03\x01US\2\0\0\0", 10);
+    for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+      std::ifstream stream(entry.path(), std::ios::binary);
+      std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+      const size_t element = bytes.find(kUnsigned);
+      ASSERT_NE(element, std::string::npos);
+      bytes[element + 8] = 1;
+      Write(entry.path().filename().string(), bytes);
     }
   }
 };
@@ -77,6 +100,31 @@ INSTANTIATE_TEST_SUITE_P(
                       Syntax{"jpeg_ls", gdcm::TransferSyntax::JPEGLSLossless},
                       Syntax{"jpeg_2000", gdcm::TransferSyntax::JPEG2000Lossless}),
     [](const auto& test) { return std::string(test.param.name); });
+
+// The codestreams of JPEG 2000 and JPEG-LS hold 13 bits without a sign; only PixelRepresentation of
+// the header says that the highest is one. GDCM writes such a codestream for values that the header
+// calls unsigned, which is then corrected in place.
+TEST_F(TransferSyntaxTest, SignedValuesOfFewerBitsAreThoseOfTheUncompressedSeries) {
+  std::vector<DicomFile> series = PhantomSeries({.columns = 64, .rows = 60});
+  WriteSeries(series);
+  ASSERT_OK_AND_ASSIGN(const CtVolume plain, Read());
+  constexpr size_t kPixels = 64 * 60;
+  for (size_t k = 0; k < series.size(); ++k) {
+    std::vector<uint16_t> stored(kPixels);
+    for (size_t i = 0; i < kPixels; ++i) stored[i] = plain.hu[kPixels * k + i] & 0x1fff;
+    series[k].Pixels(stored).Short(kBitsStored, 13).Short(kHighBit, 12);
+    series[k].Text(DicomFile::kRescaleIntercept, "DS", "0");
+  }
+  for (const auto type :
+       {gdcm::TransferSyntax::JPEG2000Lossless, gdcm::TransferSyntax::JPEGLSLossless,
+        gdcm::TransferSyntax::JPEGLosslessProcess14_1, gdcm::TransferSyntax::RLELossless}) {
+    WriteSeries(series);
+    Compress(type);
+    CallPixelsSigned();
+    ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+    EXPECT_EQ(volume.hu, plain.hu) << gdcm::TransferSyntax::GetTSString(type);
+  }
+}
 
 TEST_F(TransferSyntaxTest, DeflatedFilesAreRefusedAsWhatTheyAre) {
   WriteIn(gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian);

@@ -185,7 +185,7 @@ TEST_F(DicomVolumeTest, OtherSeriesAndOtherFilesAreLeftAsideWithANote) {
 TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithWhatItHolds) {
   Expect(Read(), "the folder is empty");
   std::filesystem::create_directory(Path("inner"));
-  Expect(Read(), "no files but 1 folders");
+  Expect(Read(), "no files in it or in the folders below it");
   Write("readme.txt", "not a slice");
   Expect(Read(), "none of the 1 files in the folder is a DICOM file");
   Expect(Read({}, "readme.txt"), "the file is not a DICOM file");
@@ -385,10 +385,33 @@ TEST_F(DicomVolumeTest, SlicesThatAreNotOneVolumeAreRefused) {
   const std::vector<BadValue> values = {
       {DicomFile::kOrientation, "DS", "0\\1\\0\\1\\0\\0", "in orientation"},
       {DicomFile::kPixelSpacing, "DS", "0.75\\0.55", "in pixel spacing"},
-      {DicomFile::kRescaleSlope, "DS", "2", "in how values become HU"},
       {DicomFile::kRows, "US", std::string("\x0c\0", 2), "in size (12 x 12 instead of 12 x 10)"},
   };
   for (const BadValue& bad : values) ExpectFifthSliceIsRefused(bad);
+}
+
+TEST_F(DicomVolumeTest, EachSliceHasItsOwnRescale) {
+  std::vector<DicomFile> series = PhantomSeries();
+  WriteSeries(series);
+  ASSERT_OK_AND_ASSIGN(const CtVolume plain, Read());
+  const auto store_slice = [&](size_t k, int slope_inverse, int intercept) {
+    std::vector<uint16_t> pixels;
+    for (size_t i = 0; i < 120; ++i) {
+      pixels.push_back(static_cast<uint16_t>(slope_inverse * (plain.hu[120 * k + i] - intercept)));
+    }
+    series[k]
+        .Pixels(pixels)
+        .Text(DicomFile::kRescaleIntercept, "DS", std::to_string(intercept))
+        .Text(DicomFile::kRescaleSlope, "DS", std::to_string(1.0 / slope_inverse));
+  };
+  store_slice(2, 1, -1020);
+  store_slice(5, 2, -2045);
+  WriteSeries(series);
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+  EXPECT_EQ(volume.hu, plain.hu);
+  EXPECT_THAT(volume.provenance.notes,
+              ElementsAre(AllOf(HasSubstr("RescaleIntercept -1024 and RescaleSlope 1, in 7 of 9"),
+                                HasSubstr("RescaleIntercept -2045 to -1020"))));
 }
 
 TEST_F(DicomVolumeTest, MissingTagsAreNamed) {

@@ -1,8 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// Enhanced CT: a whole scan in one file.
+// A whole scan in one file: Enhanced CT, and the plain CT class with several frames.
 
+#include <gdcmImageChangeTransferSyntax.h>
+#include <gdcmImageReader.h>
+#include <gdcmWriter.h>
 #include <random>
 
 #include "tests/core/imaging/ct/ct_folder.h"
@@ -23,6 +26,8 @@ using tissueform::testing::StatusIs;
 using tissueform::testing::WorstPhantomError;
 
 using ::tissueform::testing::kInvalid;
+
+constexpr uint32_t kSpacingBetweenSlices = 0x00180088;
 
 class MultiFrameTest : public CtFolder {};
 
@@ -50,6 +55,69 @@ TEST_F(MultiFrameTest, ScanMayBeSpreadOverSeveralFiles) {
   EXPECT_EQ(volume.size[2], 9);
   EXPECT_EQ(WorstPhantomError(volume), 0);
   EXPECT_EQ(volume.provenance.num_files, 2);
+}
+
+// As cone-beam devices write it: plain CT class, geometry at the top level only.
+DicomFile PlainPhantom() {
+  DicomFile file = EnhancedPhantom({}, {0, 1, 2, 3, 4, 5, 6, 7, 8}, true);
+  file.Erase(DicomFile::kFrameGroups)
+      .Erase(DicomFile::kSharedGroups)
+      .Text(DicomFile::kSopClass, "UI", "1.2.840.10008.5.1.4.1.1.2")
+      .Text(DicomFile::kPosition, "DS", "-30\\20\\100")
+      .Text(DicomFile::kOrientation, "DS", "1\\0\\0\\0\\1\\0")
+      .Text(DicomFile::kPixelSpacing, "DS", "0.75\\0.5")
+      .Text(DicomFile::kRescaleIntercept, "DS", "-1024")
+      .Text(DicomFile::kRescaleSlope, "DS", "1")
+      .Text(kSpacingBetweenSlices, "DS", "1.25");
+  return file;
+}
+
+TEST_F(MultiFrameTest, FramesOfThePlainClassAreEvenlySpaced) {
+  Write("ct", PlainPhantom().Bytes());
+  const auto expect_phantom = [](const CtVolume& volume) {
+    EXPECT_THAT(volume.size, ElementsAre(12, 10, 9));
+    EXPECT_TRUE(volume.spacing_mm.isApprox(Eigen::Vector3d(0.5, 0.75, 1.25), 1e-9));
+    EXPECT_EQ(WorstPhantomError(volume), 0);
+    EXPECT_THAT(volume.provenance.notes,
+                ElementsAre(AllOf(HasSubstr("its 9 frames are placed by SpacingBetweenSlices"),
+                                  HasSubstr("upside down"))));
+  };
+  ASSERT_OK_AND_ASSIGN(const CtVolume plain, Read());
+  expect_phantom(plain);
+  gdcm::ImageReader reader;
+  reader.SetFileName(Path("ct").c_str());
+  ASSERT_TRUE(reader.Read());
+  gdcm::ImageChangeTransferSyntax change;
+  change.SetTransferSyntax(gdcm::TransferSyntax::JPEGLosslessProcess14_1);
+  change.SetInput(reader.GetImage());
+  ASSERT_TRUE(change.Change());
+  // Not by ImageWriter, which makes another class of it.
+  reader.GetFile().GetDataSet().Replace(change.GetOutput().GetDataElement());
+  const std::string syntax = "1.2.840.10008.1.2.4.70";
+  gdcm::DataElement element(gdcm::Tag(0x0002, 0x0010));
+  element.SetVR(gdcm::VR::UI);
+  element.SetByteValue(syntax.data(), static_cast<uint32_t>(syntax.size()));
+  reader.GetFile().GetHeader().Replace(element);
+  reader.GetFile().GetHeader().SetDataSetTransferSyntax(
+      gdcm::TransferSyntax::JPEGLosslessProcess14_1);
+  gdcm::Writer writer;
+  writer.CheckFileMetaInformationOff();
+  writer.SetFile(reader.GetFile());
+  writer.SetFileName(Path("ct").c_str());
+  ASSERT_TRUE(writer.Write());
+  ASSERT_OK_AND_ASSIGN(const CtVolume compressed, Read());
+  expect_phantom(compressed);
+}
+
+TEST_F(MultiFrameTest, FramesOfThePlainClassNeedTheirSpacing) {
+  for (const char* spacing : {"", "0", "nan", "1e9"}) {
+    Write("ct", PlainPhantom().Text(kSpacingBetweenSlices, "DS", spacing).Bytes());
+    EXPECT_EQ(Read().status().code(), kInvalid) << spacing;
+  }
+  Write("ct", PlainPhantom().Text(DicomFile::kNumberOfFrames, "IS", "2000000000").Bytes());
+  EXPECT_THAT(Read(), StatusIs(kInvalid, HasSubstr("without frame positions")));
+  Write("ct", PlainPhantom().Text(DicomFile::kNumberOfFrames, "IS", "20").Bytes());
+  EXPECT_THAT(Read(), StatusIs(kInvalid, HasSubstr("cannot be read")));
 }
 
 TEST_F(MultiFrameTest, FramesWithoutAPlaceAreNamed) {

@@ -1,9 +1,12 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 
@@ -120,6 +123,96 @@ TEST_F(VolumeFileTest, FormatsThatStateLpsAreRead) {
                                 "ElementDataFile = LOCAL\n" + voxels),
       "MetaImage");
   ExpectUprightPhantom(ReadContents("v.nii", NiftiHeader(1) + voxels), "NIfTI");
+}
+
+// The steps of the sform along i, j, k and the place of voxel 0, row by row; qform none.
+std::string NiftiWithSform(const std::array<float, 12>& sform, char unit = 2) {
+  std::string header = NiftiHeader(1);
+  std::memcpy(header.data() + 280, sform.data(), sizeof(sform));
+  header[123] = unit;
+  return header;
+}
+
+TEST_F(VolumeFileTest, NiftiAxesThatAreOffSquareByRoundingAreMadeSquare) {
+  const std::string header =
+      NiftiWithSform({-0.5F, 0.0004F, 0, 30, 0, -0.75F, 0.0009F, -20, 0.0001F, 0, 1.25F, 100});
+  const std::string voxels = PhantomBytes<int16_t>(UprightPlace);
+  for (const bool packed : {false, true}) {
+    const std::string name = packed ? "v.nii.gz" : "v.nii";
+    const std::string bytes = header + voxels;
+    ASSERT_OK_AND_ASSIGN(const CtVolume volume,
+                         ReadContents(name, packed ? Pack(bytes, true) : bytes));
+    EXPECT_TRUE((volume.direction.transpose() * volume.direction).isIdentity(1e-12));
+    EXPECT_TRUE(volume.direction.isIdentity(1e-3));
+    EXPECT_TRUE(volume.spacing_mm.isApprox(Eigen::Vector3d(0.5, 0.75, 1.25), 1e-6));
+    EXPECT_TRUE(volume.origin_mm.isApprox(Eigen::Vector3d(-30, 20, 100), 1e-6));
+    EXPECT_EQ(volume.At(7, 3, 2), PhantomHu(UprightPlace(7, 3, 2)));
+    EXPECT_EQ(volume.provenance.format, "NIfTI");
+    EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("not exactly square")));
+  }
+}
+
+TEST_F(VolumeFileTest, NiftiShearedAsByATiltedGantryKeepsItsShear) {
+  const double tilt = 8 * M_PI / 180;
+  const auto step_y = static_cast<float>(1.25 * std::sin(tilt));
+  const auto step_z = static_cast<float>(1.25 * std::cos(tilt));
+  const auto place = [&](int i, int j, int k) -> Eigen::Vector3d {
+    return {-30 + 0.5 * i, 20 + 0.75 * j + double{step_y} * k, 100 + double{step_z} * k};
+  };
+  const std::string voxels = PhantomBytes<int16_t>(place);
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume,
+                       ReadContents("v.nii", NiftiWithSform({-0.5F, 0, 0, 30, 0, -0.75F, -step_y,
+                                                             -20, 0, 0, step_z, 100}) +
+                                                 voxels));
+  EXPECT_LE(WorstPhantomError(volume), 1);  // rounding of places that float32 states
+  EXPECT_NEAR(std::abs(volume.provenance.gantry_tilt_deg), 8, 1e-4);
+  for (const auto& sform :
+       {std::array<float, 12>{-0.5F, 0, 0.3F, 30, 0, -0.75F, 0, -20, 0, 0, 1.25F, 100},
+        std::array<float, 12>{-0.5F, 0.2F, 0, 30, 0, -0.75F, 0, -20, 0, 0, 1.25F, 100},
+        std::array<float, 12>{-0.5F, 0, 0, 30, 0, -0.75F, 1, -20, 0, 0, 1.25F, 100}}) {
+    EXPECT_THAT(ReadContents("v.nii", NiftiWithSform(sform) + voxels),
+                StatusIs(kInvalid, HasSubstr("axes are sheared")));
+  }
+}
+
+TEST_F(VolumeFileTest, NiftiFormsThatMirrorEachOtherAreRefused) {
+  const std::string voxels = PhantomBytes<int16_t>(UprightPlace);
+  std::string header = NiftiHeader(1);
+  const int16_t scanner = 1;
+  const std::array<float, 6> half_turn = {0, 0, 1, 30, -20, 100};
+  std::memcpy(header.data() + 252, &scanner, sizeof(scanner));
+  std::memcpy(header.data() + 256, half_turn.data(), sizeof(half_turn));
+  ExpectUprightPhantom(ReadContents("v.nii", header + voxels), "NIfTI");
+  for (const size_t step : {size_t{280}, size_t{76}}) {  // -x of the sform, or qfac
+    std::string mirrored = header;
+    float number = 0;
+    std::memcpy(&number, mirrored.data() + step, sizeof(number));
+    number = -number;
+    std::memcpy(mirrored.data() + step, &number, sizeof(number));
+    EXPECT_THAT(ReadContents("v.nii", mirrored + voxels),
+                StatusIs(kInvalid, HasSubstr("left and right of the patient are uncertain")));
+  }
+}
+
+TEST_F(VolumeFileTest, NiftiInMetersOrMicrometersIsConverted) {
+  const std::string voxels = PhantomBytes<int16_t>(UprightPlace);
+  const std::array<float, 12> mm = {-0.5F, 0, 0, 30, 0, -0.75F, 0, -20, 0, 0, 1.25F, 100};
+  for (const auto& [unit, scale] : {std::pair('\1', 0.001F), std::pair('\3', 1000.0F)}) {
+    std::array<float, 12> scaled = mm;
+    for (float& number : scaled) number *= scale;
+    std::string header = NiftiWithSform(scaled, unit);
+    const std::array<float, 3> pixdim = {0.5F * scale, 0.75F * scale, 1.25F * scale};
+    std::memcpy(header.data() + 80, pixdim.data(), sizeof(pixdim));
+    ASSERT_OK_AND_ASSIGN(const CtVolume volume, ReadContents("v.nii", header + voxels));
+    EXPECT_TRUE(volume.spacing_mm.isApprox(Eigen::Vector3d(0.5, 0.75, 1.25), 1e-6));
+    EXPECT_TRUE(volume.origin_mm.isApprox(Eigen::Vector3d(-30, 20, 100), 1e-6));
+    EXPECT_TRUE(volume.direction.isIdentity(1e-6));
+    EXPECT_EQ(volume.At(7, 3, 2), PhantomHu(UprightPlace(7, 3, 2)));
+    EXPECT_THAT(volume.provenance.notes, ElementsAre(HasSubstr("converted to mm")));
+  }
+  EXPECT_THAT(ReadContents("v.nii", NiftiWithSform(mm, '\1') + voxels),
+              StatusIs(kInvalid, AllOf(HasSubstr("the voxels are 500 mm apart"),
+                                       HasSubstr("set xyzt_units to 2"))));
 }
 
 TEST_F(VolumeFileTest, NrrdInRasIsTurnedToLps) {

@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 
 #include "core/mesh/io/tet_mesh_io.h"
+#include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/tet_quality.h"
 #include "core/mesh/tet_topology.h"
 #include "tests/core/mesh/io/mesh_folder.h"
@@ -242,6 +243,65 @@ TEST_F(TetFormatsTest, FormatBehindAnotherEndingIsNamedInOneLine) {
                                             HasSubstr("not one of the supported ones")));
   EXPECT_THAT(Read("a.stl", "solid a\nendsolid a\n"),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("a mesh of tets is needed")));
+}
+
+TEST_F(TetFormatsTest, VtkIsToldApartByContent) {
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile legacy, ReadTetMesh(TwoTets("legacy_ascii.vtk")));
+  ASSERT_THAT(WriteTetMesh(Path("two.vtu"), legacy), IsOk());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile xml, Read("xml.vtk", BytesOfFile(Path("two.vtu"))));
+  EXPECT_EQ(xml.mesh.positions(), legacy.mesh.positions());
+  EXPECT_EQ(xml.mesh.tets(), legacy.mesh.tets());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile text,
+                       Read("text.vtu", BytesOfFile(TwoTets("legacy_ascii.vtk"))));
+  EXPECT_EQ(text.mesh.tets(), legacy.mesh.tets());
+}
+
+TEST_F(TetFormatsTest, FormatsThatAreNotReadAreNamed) {
+  const std::string lfs =
+      "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 1234567\n";
+  const std::string binary_medit("\1\0\0\0\2\0\0\0\3\0\0\0", 12);
+  const std::string ansys = "       1 0.1000000000000E+01 0.2500000000000E+00\n       2\n";
+  struct Case {
+    const char* name;
+    std::string contents;
+    const char* message;
+  };
+  const std::vector<Case> cases = {
+      {"a.mesh", "MFEM mesh v1.0\n\ndimension\n3\n", "it is an MFEM mesh; save it"},
+      {"a.mesh", binary_medit, "it is a binary MEDIT mesh (.meshb); save it as ASCII"},
+      {"a.meshb", binary_medit, "it is a binary MEDIT mesh (.meshb); save it as ASCII"},
+      {"a.node", ansys, "it is an ANSYS file"},
+      {"a.node", "/COM,ANSYS RELEASE 19\n", "it is an ANSYS file"},
+      {"a.vtu", lfs, "run \"git lfs pull\""},
+      {"a.vtk", lfs, "run \"git lfs pull\""},
+      {"a.msh", lfs, "run \"git lfs pull\""},
+      {"a.mesh", lfs, "run \"git lfs pull\""},
+      {"a.ele", lfs, "run \"git lfs pull\""}};
+  for (const Case& one : cases) {
+    EXPECT_THAT(Read(one.name, one.contents),
+                StatusIs(absl::StatusCode::kInvalidArgument,
+                         AllOf(HasSubstr(one.name), HasSubstr(one.message))));
+  }
+  Write("a.stl", lfs);
+  EXPECT_THAT(ReadTriangleMesh(Path("a.stl")),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("git lfs pull")));
+}
+
+// Three programs write Gmsh 2.2 in binary so. What Gmsh makes of it is what is read.
+TEST_F(TetFormatsTest, GmshBinaryNeedsNoLineBreakBeforeItsLastMark) {
+  std::string bytes = BytesOfFile(TwoTets("gmsh22_binary.msh"));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile with_break, Read("with.msh", bytes));
+  const size_t mark = bytes.rfind("\n$EndElements");
+  ASSERT_NE(mark, std::string::npos);
+  bytes.erase(mark, 1);
+  bytes.resize(bytes.find("$EndElements") + std::string("$EndElements\n").size());
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile without, Read("without.msh", bytes));
+  EXPECT_EQ(without.mesh.positions(), with_break.mesh.positions());
+  EXPECT_EQ(without.mesh.tets(), with_break.mesh.tets());
+  bytes.resize(bytes.rfind("$EndElements") + 6);
+  bytes.back() = '\1';
+  EXPECT_THAT(Read("cut.msh", bytes),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("it is truncated")));
 }
 
 TEST_F(TetFormatsTest, MeshOverTheMemoryLimitIsRefusedBeforeItIsTried) {
