@@ -137,7 +137,7 @@ TEST_F(CalculixOracleTest, LinearElasticityWithContactEqualsCalculixOnAHead) {
   const AccuracyCase with = WithContact(head);
   ASSERT_OK_AND_ASSIGN(const double distance,
                        Distance(with, DeformationModel::kLinearElastic, 0.45));
-  // Of a movement of 10 mm; its share from kSmallMotion, which 1e-4 makes eight times larger.
+  // Of a movement of 4 mm; its share from kSmallMotion, which 1e-4 makes eight times larger.
   EXPECT_LT(distance, 2e-5);
   // The rows matter.
   ASSERT_OK_AND_ASSIGN(const Positions sticking,
