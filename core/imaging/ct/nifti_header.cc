@@ -115,7 +115,8 @@ absl::Status TakeAxes(const Eigen::Matrix3d& axes, CtVolume* volume) {
         "gantry does it; resample it upright",
         in_plane, along_rows, along_columns));
   }
-  const Eigen::Matrix<double, 3, 2> plane = MadeSquare(Eigen::Matrix<double, 3, 2>(axes.leftCols<2>()));
+  const Eigen::Matrix<double, 3, 2> plane =
+      MadeSquare(Eigen::Matrix<double, 3, 2>(axes.leftCols<2>()));
   volume->direction << plane, axes.col(2);
   Eigen::Vector3d up = Eigen::Vector3d(plane.col(0)).cross(Eigen::Vector3d(plane.col(1)));
   if (up.dot(axes.col(2)) < 0) up = -up;
@@ -144,7 +145,8 @@ std::optional<NiftiHeader> ParseNiftiHeader(absl::string_view start) {
 }
 
 absl::Status CheckForms(const NiftiHeader& header) {
-  if (!header.qform || !header.sform || !(Handedness(*header.qform) * Handedness(*header.sform) < 0)) {
+  if (!header.qform || !header.sform ||
+      !(Handedness(*header.qform) * Handedness(*header.sform) < 0)) {
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(
@@ -157,9 +159,9 @@ absl::Status PlaceByHeader(const NiftiHeader& header, CtVolume* volume) {
   form.topRows<2>() *= -1;  // RAS to LPS
   if (header.NeedsScale()) {
     form *= header.unit == 1 ? 1000 : 0.001;
-    volume->provenance.notes.push_back(
-        absl::StrCat("the file states ", header.unit == 1 ? "meters" : "micrometers",
-                     " (xyzt_units): converted to mm"));
+    volume->provenance.notes.push_back(absl::StrCat("the file states ",
+                                                    header.unit == 1 ? "meters" : "micrometers",
+                                                    " (xyzt_units): converted to mm"));
   }
   const Eigen::Vector3d spacing = form.leftCols<3>().colwise().norm();
   if (!form.allFinite() || !(spacing.minCoeff() > 0)) {

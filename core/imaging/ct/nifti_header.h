@@ -45,8 +45,8 @@ absl::Status CheckForms(const NiftiHeader& header);
 // one, with a note where the unit is converted or axes are made square (off by up to 1e-2). Slices
 // that are sheared along their columns are as those of a tilted gantry. REQUIRES: StatesPlace().
 //
-// Errors: InvalidArgument where steps are no finite volume, for rows and columns that are not square
-// to each other, and for slices sheared otherwise or by more than a gantry tilts.
+// Errors: InvalidArgument where steps are no finite volume, for rows and columns that are not
+// square to each other, and for slices sheared otherwise or by more than a gantry tilts.
 absl::Status PlaceByHeader(const NiftiHeader& header, CtVolume* volume);
 
 }  // namespace tissueform

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -25,6 +24,10 @@ constexpr int16_t kRimHu = 12;
 constexpr int kDeepPixels = 4;
 constexpr double kLeastInAir = 0.25;
 constexpr int16_t kWholly = 1000;
+// Streaks reach so far beyond the slices with metal; and the edge of a filling differs between
+// slices by no more pixels, with its rim.
+constexpr double kStreaksBesideMm = 5;
+constexpr int kEdgePixels = 4;
 constexpr double kAskew = 1e-6;
 
 using Pixels = std::vector<std::array<int, 2>>;
@@ -53,6 +56,18 @@ class Slice {
     Pixels rim = edge;
     for (int step = 0; step < kRimPixels; ++step) rim = Grow(rim, low);
     return TouchesTissue();
+  }
+
+  bool TouchesTissue() const {
+    for (int y = 0; y < height_; ++y) {
+      for (int x = 0; x < width_; ++x) {
+        if (Hu(x, y) <= kTissueHu) continue;
+        for (const auto& [dx, dy] : kSides) {
+          if (Contains(x + dx, y + dy) && IsFilled(x + dx, y + dy)) return true;
+        }
+      }
+    }
+    return false;
   }
 
  private:
@@ -158,22 +173,83 @@ class Slice {
     return next;
   }
 
-  bool TouchesTissue() const {
-    for (int y = 0; y < height_; ++y) {
-      for (int x = 0; x < width_; ++x) {
-        if (Hu(x, y) <= kTissueHu) continue;
-        for (const auto& [dx, dy] : kSides) {
-          if (Contains(x + dx, y + dy) && IsFilled(x + dx, y + dy)) return true;
-        }
-      }
-    }
-    return false;
-  }
-
   int width_;
   int height_;
   const int16_t* hu_;
   uint8_t* filled_;
+};
+
+// Takes streaks of metal out of what is filled.
+class StreakFilter {
+ public:
+  StreakFilter(const CtVolume& volume, const std::vector<uint8_t>& metal,
+               std::vector<uint8_t>* filled)
+      : width_(volume.size[0]), height_(volume.size[1]), filled_(*filled) {
+    const auto slices = static_cast<size_t>(volume.size[2]);
+    const size_t pixels = NumPixels();
+    const auto reach = static_cast<size_t>(std::ceil(kStreaksBesideMm / volume.spacing_mm[2]));
+    has_streaks_.assign(slices, false);
+    for (size_t k = 0; k < slices; ++k) {
+      const auto begin = metal.begin() + static_cast<std::ptrdiff_t>(k * pixels);
+      if (std::find(begin, begin + static_cast<std::ptrdiff_t>(pixels), 1) ==
+          begin + static_cast<std::ptrdiff_t>(pixels)) {
+        continue;
+      }
+      for (size_t near = k - std::min(k, reach); near < std::min(slices, k + reach + 1); ++near) {
+        has_streaks_[near] = true;
+      }
+    }
+  }
+
+  // Whether the slice was changed. It reads slices without streaks only: slices may run at once.
+  bool Run(size_t k) {
+    if (!has_streaks_[k]) return false;
+    std::vector<uint8_t> circle(NumPixels(), 0);
+    bool any = false;
+    for (const int step : {-1, 1}) {
+      auto other = static_cast<std::ptrdiff_t>(k);
+      while (InStack(other) && has_streaks_[static_cast<size_t>(other)]) other += step;
+      if (!InStack(other)) continue;
+      any = true;
+      for (size_t i = 0; i < circle.size(); ++i) circle[i] |= SliceOf(other)[i];
+    }
+    if (!any) return false;  // metal everywhere: nothing to compare with
+    for (int step = 0; step < kEdgePixels; ++step) circle = Widened(circle);
+    uint8_t* const slice = SliceOf(static_cast<std::ptrdiff_t>(k));
+    for (size_t i = 0; i < circle.size(); ++i) slice[i] &= circle[i];
+    return true;
+  }
+
+ private:
+  size_t NumPixels() const { return static_cast<size_t>(width_) * static_cast<size_t>(height_); }
+  bool InStack(std::ptrdiff_t k) const {
+    return k >= 0 && k < static_cast<std::ptrdiff_t>(has_streaks_.size());
+  }
+  uint8_t* SliceOf(std::ptrdiff_t k) {
+    return filled_.data() + k * static_cast<std::ptrdiff_t>(NumPixels());
+  }
+
+  std::vector<uint8_t> Widened(const std::vector<uint8_t>& mask) const {
+    std::vector<uint8_t> wide = mask;
+    for (int y = 0; y < height_; ++y) {
+      for (int x = 0; x < width_; ++x) {
+        if (mask[Index(x, y)] == 0) continue;
+        for (const auto& [dx, dy] : kSides) {
+          const bool inside = x + dx >= 0 && y + dy >= 0 && x + dx < width_ && y + dy < height_;
+          if (inside) wide[Index(x + dx, y + dy)] = 1;
+        }
+      }
+    }
+    return wide;
+  }
+  size_t Index(int x, int y) const {
+    return static_cast<size_t>(x) + static_cast<size_t>(width_) * static_cast<size_t>(y);
+  }
+
+  int width_;
+  int height_;
+  std::vector<uint8_t>& filled_;
+  std::vector<bool> has_streaks_;
 };
 
 bool IsUpright(const CtVolume& volume) {
@@ -185,23 +261,32 @@ bool IsUpright(const CtVolume& volume) {
 
 }  // namespace
 
-std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads) {
+std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads,
+                                   const std::vector<uint8_t>& metal) {
   const size_t pixels = static_cast<size_t>(volume.size[0]) * static_cast<size_t>(volume.size[1]);
   std::vector<uint8_t> unscanned(volume.hu.size(), 0);
-  std::atomic<bool> cuts_tissue = false;
-  ParallelFor(threads, volume.size[2], 1, [&](Eigen::Index begin, Eigen::Index end) {
-    for (auto k = static_cast<int>(begin); k < end; ++k) {
-      Slice slice(volume, k, unscanned.data() + pixels * static_cast<size_t>(k));
-      if (slice.Fill()) cuts_tissue = true;
-    }
-  });
-  if (!cuts_tissue) unscanned.clear();
+  std::vector<uint8_t> cuts_tissue(static_cast<size_t>(volume.size[2]), 0);
+  const auto for_each_slice = [&](const auto& visit) {
+    ParallelFor(threads, volume.size[2], 1, [&](Eigen::Index begin, Eigen::Index end) {
+      for (auto k = static_cast<size_t>(begin); k < static_cast<size_t>(end); ++k) {
+        visit(k, Slice(volume, static_cast<int>(k), unscanned.data() + pixels * k));
+      }
+    });
+  };
+  for_each_slice([&](size_t k, Slice slice) { cuts_tissue[k] = slice.Fill() ? 1 : 0; });
+  if (!metal.empty()) {
+    StreakFilter filter(volume, metal, &unscanned);
+    for_each_slice([&](size_t k, const Slice& slice) {
+      if (filter.Run(k)) cuts_tissue[k] = slice.TouchesTissue() ? 1 : 0;
+    });
+  }
+  if (std::find(cuts_tissue.begin(), cuts_tissue.end(), 1) == cuts_tissue.end()) unscanned.clear();
   return unscanned;
 }
 
-absl::StatusOr<LabelGrid> ResampleUnscanned(const CtVolume& volume, double spacing_mm,
-                                            int threads) {
-  const std::vector<uint8_t> unscanned = FindUnscanned(volume, threads);
+absl::StatusOr<LabelGrid> ResampleUnscanned(const CtVolume& volume, double spacing_mm, int threads,
+                                            const std::vector<uint8_t>& metal) {
+  const std::vector<uint8_t> unscanned = FindUnscanned(volume, threads, metal);
   if (unscanned.empty() && IsUpright(volume)) return LabelGrid();
   // The mean over a voxel of the grid is the share of it that was scanned; air where there is no
   // volume.

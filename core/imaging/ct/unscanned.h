@@ -23,12 +23,19 @@ namespace tissueform {
 // beside a quarter or more of its edge there is air that was measured. Empty where no tissue (over
 // -500 HU) ends on it.
 //
+// Dark streaks of metal may end at the lowest HU, too, and join the filling to the tissue. The
+// scanner's circle is the same in all slices: so in slices with metal, and up to 5 mm from them,
+// only what the nearest other slice below or above has as filling counts, and 4 pixels around it.
+// `metal` is 1 where a voxel is metal, as `hu` of the volume; empty where there is none.
+//
 // The result does not depend on `threads`.
-std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads);
+std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads,
+                                   const std::vector<uint8_t>& metal = {});
 
 // 1 where half of the voxel or more was not scanned, on the grid that ResampleIsotropic makes of
 // `volume`, and where that grid reaches beyond a volume that lies askew. Without voxels where
 // nothing of the kind is. Errors: those of ResampleIsotropic.
-absl::StatusOr<LabelGrid> ResampleUnscanned(const CtVolume& volume, double spacing_mm, int threads);
+absl::StatusOr<LabelGrid> ResampleUnscanned(const CtVolume& volume, double spacing_mm, int threads,
+                                            const std::vector<uint8_t>& metal = {});
 
 }  // namespace tissueform

@@ -12,6 +12,7 @@
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
 #include "core/imaging/ct/isotropic_resample.h"
+#include "core/imaging/ct/unscanned.h"
 #include "core/imaging/metal/parallel_beam.h"
 #include "core/imaging/metal/slice_correction.h"
 #include "core/imaging/metal/slice_stack.h"
@@ -210,6 +211,7 @@ absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spaci
   MetalFindings findings;
   if (options.correct) findings = FindMetal(volume, options.threshold_hu);
   const ResampleOptions resample = {.threads = threads};
+  TF_ASSIGN_OR_RETURN(ct.unscanned, ResampleUnscanned(volume, spacing_mm, threads, findings.mask));
   if (findings.any()) {
     TF_ASSIGN_OR_RETURN(ct.before, ResampleIsotropic(volume, spacing_mm, resample));
     ct.report = ReduceMetalArtifacts(findings, threads, &volume);

@@ -48,6 +48,8 @@ struct CtWithMetal {
   // What `hu` was before, from 5 mm under to 5 mm over the metal; without voxels where there is
   // none.
   HuGrid before;
+  // As ResampleUnscanned makes it, without the streaks of the metal.
+  LabelGrid unscanned;
   MetalReport report;
 };
 

@@ -13,7 +13,6 @@
 #include "core/imaging/anatomy/head_checks.h"
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/imaging/anatomy/surface_extraction.h"
-#include "core/imaging/ct/unscanned.h"
 #include "core/planning/plan_building/trial_solve.h"
 #include "core/planning/plan_building/viewer_surfaces.h"
 
@@ -95,9 +94,9 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
                      .spacing_mm = volume.spacing_mm,
                      .unscanned = {},
                      .ct = {}};
-  TF_ASSIGN_OR_RETURN(result.unscanned, ResampleUnscanned(volume, recipe.spacing_mm, threads));
   TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
                                                         recipe.metal, threads));
+  result.unscanned = std::move(result.ct.unscanned);
   return result;
 }
 

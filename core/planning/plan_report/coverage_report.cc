@@ -4,6 +4,7 @@
 #include "core/planning/plan_report/coverage_report.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -97,11 +98,15 @@ std::string GapText(const SkinGap& gap, double limit_mm) {
 }
 
 // "the nose (1234 mm2) and the upper lip (56 mm2)"; empty where no named region is cut.
-std::string CutRegionsText(const ScannerCut& cut) {
+std::string CutRegionsText(const std::vector<ScannerCut>& cuts) {
   std::vector<std::string> parts;
   for (const SkinRegion region : kNamedSkinRegions) {
-    const double mm2 = cut.region_mm2[static_cast<size_t>(region)];
-    if (mm2 < kLeastCutMm2) continue;
+    double mm2 = 0;
+    for (const ScannerCut& cut : cuts) {
+      const double of_cut = cut.region_mm2[static_cast<size_t>(region)];
+      mm2 += of_cut < kLeastCutMm2 ? 0 : of_cut;
+    }
+    if (mm2 == 0) continue;
     parts.push_back(absl::StrFormat("%s (%.0f mm2)", Words(region), mm2));
   }
   return absl::StrJoin(parts, ", ");
@@ -200,22 +205,30 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
 }
 
 std::vector<std::string> CutCautions(const SkinCoverage& coverage) {
-  std::vector<std::string> cautions;
-  for (const ScannerCut& cut : coverage.cuts) {
-    std::string text = absl::StrFormat(
-        "The field of view, or a border of the CT, cuts the face at %s: %.0f mm2, between %s and "
-        "%s. The face extends beyond it; the model does not. The cut is not treated as skin: it is "
-        "counted neither as covered nor as missing.",
-        PlaceText(cut.middle), cut.area_mm2, PlaceText(cut.low), PlaceText(cut.high));
-    const std::string regions = CutRegionsText(cut);
-    if (!regions.empty()) {
-      absl::StrAppend(&text,
-                      " It is in the front of the face, where predictions are evaluated: at ",
-                      regions, " no skin is predicted, and its shape is not checked.");
-    }
-    cautions.push_back(std::move(text));
+  const std::vector<ScannerCut>& cuts = coverage.cuts;
+  if (cuts.empty()) return {};
+  const ScannerCut& largest = *std::max_element(
+      cuts.begin(), cuts.end(),
+      [](const ScannerCut& a, const ScannerCut& b) { return a.area_mm2 < b.area_mm2; });
+  const double all_mm2 =
+      std::accumulate(cuts.begin(), cuts.end(), 0.0,
+                      [](double sum, const ScannerCut& cut) { return sum + cut.area_mm2; });
+  const std::string many =
+      cuts.size() > 1
+          ? absl::StrFormat("%d places, %.0f mm2 in all; the largest at ", cuts.size(), all_mm2)
+          : "";
+  std::string text = absl::StrFormat(
+      "The field of view, or a border of the CT, cuts the face at %s%s: %.0f mm2, between %s and "
+      "%s. The face extends beyond it; the model does not. The cut is not treated as skin: it is "
+      "counted neither as covered nor as missing.",
+      many, PlaceText(largest.middle), largest.area_mm2, PlaceText(largest.low),
+      PlaceText(largest.high));
+  const std::string regions = CutRegionsText(cuts);
+  if (!regions.empty()) {
+    absl::StrAppend(&text, " It is in the front of the face, where predictions are evaluated: at ",
+                    regions, " no skin is predicted, and its shape is not checked.");
   }
-  return cautions;
+  return {text};
 }
 
 bool NoseIsCut(const SkinCoverage& coverage) {

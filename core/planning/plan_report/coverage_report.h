@@ -24,8 +24,8 @@ std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage);
 // mesh's skin: place and millimetres.
 std::vector<std::string> CoverageCautions(const SkinCoverage& coverage);
 
-// A sentence for every place where the scanner's circle or a side of the CT cuts what is modelled:
-// where, how many mm2, of what, and that nothing is judged there.
+// One text if the scanner's circle or a side of the CT cuts what is modelled: how many places,
+// where the largest is, how many mm2, of which regions, and that the skin there is not judged.
 std::vector<std::string> CutCautions(const SkinCoverage& coverage);
 
 // Whether the nose, or a part of it, is cut off so: its prominence then means nothing.

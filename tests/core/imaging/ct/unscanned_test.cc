@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <utility>
 
 #include "gtest/gtest.h"
 
@@ -108,6 +109,65 @@ TEST_F(UnscannedTest, AHeadWithoutItsBackgroundIsNotCutAllRound) {
   const CtVolume volume =
       Painted([&](double x, double y) { return Head(x, y) > 0 ? Noisy(Head(x, y)) : -1024.0; });
   EXPECT_TRUE(FindUnscanned(volume, 1).empty());
+}
+
+constexpr int kMetalSlice = 4;
+
+// Nine slices, 2 mm apart, of which the fifth has metal in the middle.
+struct WithMetal {
+  CtVolume volume;
+  std::vector<uint8_t> metal;
+};
+WithMetal PaintedWithMetal(const std::function<double(double x, double y, int k)>& painter) {
+  WithMetal ct;
+  for (int k = 0; k < 9; ++k) {
+    const CtVolume slice = Painted([&](double x, double y) { return painter(x, y, k); });
+    ct.volume.hu.insert(ct.volume.hu.end(), slice.hu.begin(),
+                        slice.hu.begin() + std::ptrdiff_t{kSize} * kSize);
+  }
+  ct.volume.size = {kSize, kSize, 9};
+  ct.volume.spacing_mm[2] = 2;
+  ct.metal.assign(ct.volume.hu.size(), 0);
+  ct.metal[static_cast<size_t>(kMiddle + kSize * (kMiddle + kSize * kMetalSlice))] = 1;
+  return ct;
+}
+
+// From the head's front to the circle.
+bool InStreak(double x, double y, int k) {
+  return std::abs(k - kMetalSlice) < 2 && std::abs(x) < 4 && y < -10;
+}
+
+TEST_F(UnscannedTest, DarkStreaksOfMetalAreNotTheCircle) {
+  const WithMetal ct = PaintedWithMetal([&](double x, double y, int k) {
+    const double head = Head(x, y - 14);
+    if (!InCircle(x, y) || (InStreak(x, y, k) && head < 0)) return -1024.0;
+    return Noisy(head);
+  });
+  EXPECT_FALSE(FindUnscanned(ct.volume, 2).empty());
+  EXPECT_TRUE(FindUnscanned(ct.volume, 2, ct.metal).empty());
+}
+
+TEST_F(UnscannedTest, BesideAStreakTheCircleStillCuts) {
+  const auto cut_head = [&](double x, double y, int k) {
+    const bool streak = std::abs(k - kMetalSlice) < 2 && std::abs(y + 5) < 4 && x > 10;
+    const double head = Head(x, y);
+    if (!InCircle(x, y) || (streak && head < 0)) return -1024.0;
+    return Noisy(head);
+  };
+  const WithMetal ct = PaintedWithMetal(cut_head);
+  const std::vector<uint8_t> all = FindUnscanned(ct.volume, 2);
+  const std::vector<uint8_t> found = FindUnscanned(ct.volume, 2, ct.metal);
+  ASSERT_EQ(found.size(), all.size());
+  const auto at = [](int x, int y) {
+    return static_cast<size_t>(x + kMiddle + kSize * (y + kMiddle + kSize * kMetalSlice));
+  };
+  EXPECT_EQ(all[at(25, -5)], 1);  // in the streak
+  EXPECT_EQ(found[at(25, -5)], 0);
+  for (const auto& [x, y] : {std::pair(0, -37), std::pair(0, 38), std::pair(37, -5)}) {
+    EXPECT_EQ(found[at(x, y)], 1) << x << " " << y;
+  }
+  const auto clean = static_cast<std::ptrdiff_t>(kSize) * kSize;
+  EXPECT_TRUE(std::equal(found.begin(), found.begin() + clean, all.begin()));
 }
 
 TEST_F(UnscannedTest, OnTheGridItEndsWhereTheTissueDoes) {
