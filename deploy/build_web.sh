@@ -60,9 +60,21 @@ if ! is_newer "$generated/answer_evaluator.wasm" "$generated/made" "${evaluator_
   if ! command -v clang++ >/dev/null || ! command -v wasm-ld >/dev/null || [[ ! -e /usr/lib/wasm32-wasi/libc++.a ]]; then
     deploy/install_packages.sh build web
   fi
-  clang++ --target=wasm32-wasi -mexec-model=reactor -msimd128 -O2 -std=c++20 -stdlib=libc++ -fno-exceptions -fno-rtti \
-    -ffunction-sections -fdata-sections -Wall -Wextra -Werror -I. -Wl,--gc-sections,--strip-all,--stack-first,-z,stack-size=262144 \
-    -o "$generated/answer_evaluator.wasm" "$web/wasm/answer_evaluator.cc" "${evaluator[@]}"
+  compile=(clang++ --target=wasm32-wasi -msimd128 -std=c++20 -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections
+    -Wall -Wextra -Werror -I.)
+  objects=$(mktemp -d)
+  # Small where it does not count for the time of a frame: the page has a limit (client/web/bundle_size.mjs).
+  for source in "$web/wasm/answer_evaluator.cc" "${evaluator[@]}"; do
+    case $source in
+      */answer_bytes.cc | */answer_checks.cc | */answer_sizes.cc | */instruction_set.cc) optimize=-Oz ;;
+      */lcp_solver.cc | */contact_forces.cc | */pose_range.cc) optimize=-Os ;;
+      *) optimize=-O2 ;;
+    esac
+    "${compile[@]}" $optimize -c -o "$objects/${source//\//_}.o" "$source"
+  done
+  clang++ --target=wasm32-wasi -mexec-model=reactor -stdlib=libc++ -Wl,--gc-sections,--strip-all,--stack-first,-z,stack-size=262144 \
+    -o "$generated/answer_evaluator.wasm" "$objects"/*.o
+  rm -r "$objects"
 fi
 
 if [[ ${1:-} == --tools ]] || is_newer "$target/moving-file.html" "$web/src" "${evaluator_sources[@]}" "$web/index.html" "$web/moving-file.template.html" "$web/build_moving_file.mjs" "$web/public" "$web/vite.config.ts" "$web/package-lock.json"; then
