@@ -11,6 +11,7 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/session_conversion.h"
 #include "server/rpc/allowed_resource.h"
 
 namespace tissueform {

@@ -34,7 +34,7 @@ AnswerSizes SizesOf(const PortableAnswers& answers) {
     sizes.full_columns = answers.columns.lower.size() / sizes.rows;
   }
   if (const size_t band_columns = answers.band.steps.size(); band_columns > 0 && sizes.free > 0) {
-    sizes.band_variables = answers.band.upper.size() / band_columns / (3 * sizes.free);
+    sizes.band_variables = answers.band.upper.size() / band_columns / sizes.free / 3;
   }
   return sizes;
 }

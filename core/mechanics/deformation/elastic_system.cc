@@ -123,10 +123,10 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
   {
     const PiecewiseLinearElements elements = ElementsOf(mesh);
     const VertexCells vertex_cells(elements.cells, elements.num_vertices());
-    SparseMatrix K =
+    const SparseMatrix K =
         ElasticStiffness(elements, vertex_cells, stiffness, options.poisson_ratio, options.threads);
     elastic->assemble_seconds_ = stopwatch.Seconds();
-    TF_RETURN_IF_ERROR(elastic->Factorize(std::move(K), constraints, options, cancellation));
+    TF_RETURN_IF_ERROR(elastic->Factorize(K, constraints, options, cancellation));
   }
   TF_ASSIGN_OR_RETURN(const double of_system,
                       elastic->system_->EstimateCondition(kConditionIterations));
@@ -138,21 +138,22 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
   return elastic;
 }
 
-absl::Status ElasticSystem::Factorize(SparseMatrix K, const ConstraintSet& constraints,
+absl::Status ElasticSystem::Factorize(const SparseMatrix& K, const ConstraintSet& constraints,
                                       const ElasticSystemOptions& options,
                                       const Cancellation& cancellation) {
   if (!sliding_.empty()) {
     // Turned vertices stay whole nodes of the factor: their held unknowns are left in it, alone.
     held_ = HoldUnknowns(sliding_.Turn(K), sliding_.held());
-    K = std::move(held_.matrix);
   }
-  TF_ASSIGN_OR_RETURN(system_, DirichletSystem::Create(K, ConstrainedUnknowns(constraints),
+  TF_ASSIGN_OR_RETURN(system_, DirichletSystem::Create(sliding_.empty() ? K : held_.matrix,
+                                                       ConstrainedUnknowns(constraints),
                                                        {.backend = options.backend,
                                                         .admission = options.admission,
                                                         .unknowns_per_node = 3,
                                                         .node_order = options.node_order,
                                                         .observer = options.observer},
                                                        cancellation));
+  held_.matrix = SparseMatrix();
   return absl::OkStatus();
 }
 

@@ -98,7 +98,7 @@ class ElasticSystem {
   explicit ElasticSystem(SlidingBasis sliding) : sliding_(std::move(sliding)) {}
 
   // Factorises K; where tissue slides, in turned unknowns.
-  absl::Status Factorize(SparseMatrix K, const ConstraintSet& constraints,
+  absl::Status Factorize(const SparseMatrix& K, const ConstraintSet& constraints,
                          const ElasticSystemOptions& options, const Cancellation& cancellation);
   absl::Status PrepareResponses(const TetMesh& mesh, const ConstraintSet& constraints,
                                 const ElasticSystemOptions& options,

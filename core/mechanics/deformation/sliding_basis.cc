@@ -76,7 +76,7 @@ void SlidingBasis::FromTurned(Eigen::MatrixXd* x) const {
   }
 }
 
-HeldMatrix HoldUnknowns(SparseMatrix K, const std::vector<SlidingBasis::Held>& held) {
+HeldMatrix HoldUnknowns(const SparseMatrix& K, const std::vector<SlidingBasis::Held>& held) {
   const auto num_held = static_cast<Eigen::Index>(held.size());
   std::vector<bool> is_held(static_cast<size_t>(K.rows()), false);
   HeldMatrix result;
@@ -92,13 +92,13 @@ HeldMatrix HoldUnknowns(SparseMatrix K, const std::vector<SlidingBasis::Held>& h
     result.diagonal[h] = K.coeff(unknown, unknown);
   }
   result.columns.finalize();
+  result.matrix = K;
   for (Eigen::Index column = 0; column < K.cols(); ++column) {
-    for (SparseMatrix::InnerIterator entry(K, column); entry; ++entry) {
+    for (SparseMatrix::InnerIterator entry(result.matrix, column); entry; ++entry) {
       const bool taken_out = is_held[static_cast<size_t>(column)] || is_held[entry.row()];
       if (taken_out && entry.row() != column) entry.valueRef() = 0;
     }
   }
-  result.matrix = std::move(K);
   return result;
 }
 

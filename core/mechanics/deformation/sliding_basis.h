@@ -57,7 +57,7 @@ struct HeldMatrix {
 };
 
 // Of a symmetric K with both triangles stored and a stored diagonal.
-HeldMatrix HoldUnknowns(SparseMatrix K, const std::vector<SlidingBasis::Held>& held);
+HeldMatrix HoldUnknowns(const SparseMatrix& K, const std::vector<SlidingBasis::Held>& held);
 
 // `rhs` (#rows by k) of K x = rhs becomes that of HeldMatrix::matrix where the held unknowns have
 // `values` (#held by k).

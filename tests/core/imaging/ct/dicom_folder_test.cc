@@ -64,6 +64,7 @@ TEST_F(DicomFolderTest, DiscIsReadFromItsRoot) {
   WriteIn("DICOM/PA1/ST1/SE1", Scan(4, "H30s", 9));
   Write("viewer.exe", "MZ");
   std::vector<std::string> files;
+  files.reserve(9);
   for (int i = 0; i < 9; ++i) files.push_back(absl::StrCat("DICOM\\PA1\\ST1\\SE1\\IM00", i));
   WriteDirectory(files);
   ASSERT_OK_AND_ASSIGN(const CtVolume disc, Read());

@@ -271,6 +271,7 @@ TEST_F(TwoBlocksTest, AnswersDoNotDependOnTheDragBefore) {
     pose.rotation_vector = {number(generator), number(generator), number(generator)};
   }
   std::vector<Deformation> first;
+  first.reserve(poses.size());
   for (const HandlePose& pose : poses) first.push_back(*deformer_->Deform({pose}));
   size_t some_open = 0;
   for (size_t i = poses.size(); i-- > 0;) {
