@@ -142,7 +142,8 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
   CLI::App* build = app.add_subcommand("build", "build a plan from a CT of a head");
   build
       ->add_option("--ct", arguments->ct,
-                   "folder of a DICOM series or a file of it, or a volume (.nii .nii.gz .nrrd "
+                   "folder of a DICOM series, a study or a CD, or a DICOM file, or a volume (.nii "
+                   ".nii.gz .nrrd "
                    ".nhdr .mha .mhd)")
       ->required();
   build->add_option("--recipe", arguments->recipe, "the recipe (docs/recipe-format.md)")

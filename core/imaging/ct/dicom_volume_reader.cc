@@ -137,9 +137,11 @@ absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOption
                       options.limits));
   TF_ASSIGN_OR_RETURN(const SeriesChoice choice, ChoiceOf(path, folder, options));
   if (folder.files.empty()) {
-    return WithSearch(absl::InvalidArgumentError(absl::StrCat(
-                          "none of the ", folder.others, " files in the folder is a DICOM file")),
-                      folder, max_depth);
+    return WithSearch(
+        absl::InvalidArgumentError(absl::StrCat("none of the ", folder.others,
+                                                " files in the folder is a DICOM file; unpack "
+                                                "archives, and name the folder of the CT series")),
+        folder, max_depth);
   }
   const int copies = DropCopies(options.limits.max_file_bytes, &folder.files);
   absl::StatusOr<DicomStack> stack = ChooseSeries(folder.files, choice);

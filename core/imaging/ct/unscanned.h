@@ -26,7 +26,7 @@ namespace tissueform {
 // Dark streaks of metal may end at the lowest HU, too, and join the filling to the tissue. The
 // scanner's circle is the same in all slices: so in slices with metal, and up to 5 mm from them,
 // only what the nearest other slice below or above has as filling counts, and 4 pixels around it.
-// `metal` is 1 where a voxel is metal, as `hu` of the volume; empty where there is none.
+// `metal` is 1 where a voxel is metal, laid out as `hu` of the volume; empty without metal.
 //
 // The result does not depend on `threads`.
 std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads,

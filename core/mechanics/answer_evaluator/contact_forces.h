@@ -29,7 +29,7 @@ class ContactForces {
   double Append(const PortableAnswers& answers, std::vector<double>* factors) const;
 
  private:
-  struct Spare;  // a solver that nobody uses
+  struct Spare;  // a solver that is free
 
   std::unique_ptr<Spare> spare_;
 };

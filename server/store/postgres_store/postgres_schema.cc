@@ -148,8 +148,8 @@ CREATE INDEX mesh_rights_by_principal ON mesh_rights(principal);
 CREATE INDEX mesh_rights_by_sha256 ON mesh_rights(sha256);
 )sql";
 
-// Servers ask for rights, cases and predictions when a call names them: their changes are told to
-// nobody.
+// Servers ask for rights, cases and predictions when a call names them, so they need no notice of
+// their changes.
 constexpr char kVersion7[] = R"sql(
 DROP TRIGGER IF EXISTS tell_created ON cases;
 DROP TRIGGER IF EXISTS tell_deleted ON cases;

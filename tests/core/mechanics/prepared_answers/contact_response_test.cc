@@ -165,8 +165,8 @@ TEST_F(ContactResponseTest, WhatDoesNotFitIsRefused) {
               Not(IsEmpty()));
 }
 
-// A compliance that is none ends the search, and no answer is covered.
-TEST_F(ContactResponseTest, AComplianceThatIsNoneEnds) {
+// A matrix that is not positive definite: the search ends, and only finite errors are answered.
+TEST_F(ContactResponseTest, AMatrixThatIsNotPositiveDefiniteEnds) {
   PortableAnswers answers = response_->Describe();
   std::mt19937 generator(2);
   for (double& entry : answers.contact_compliance) {
