@@ -9,23 +9,27 @@ Writes into BUILD_DIR/tidy files batch_N.cc that include some source files each,
 and with all source files by themselves. Prints a line for each batch: its file, a tab, the source files.
 
 Files come together when their commands give no macro two values and when, as far as the first words of their lines
-tell, they name nothing the same: names of unnamed namespaces must not meet. A batch that does not compile all the same
-is the caller's to take apart.
+tell, they name nothing the same, and nothing that a header of the other names: names of unnamed namespaces must meet
+neither each other nor a header's. A batch that does not compile all the same is the caller's to take apart.
 """
 
+import functools
 import json
 import pathlib
 import re
 import shlex
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "cmake"))
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "cmake"))
 from source_names import LONERS, declared_names, imported_names  # noqa: E402
 
 MOST_FILES = 24
 
 # The one name that all programs share: in a batch each is another function.
 MAIN = re.compile(r"^int main\(", re.MULTILINE)
+
+INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 KNOWS_GCC_ONLY = re.compile(r"^#include <itk", re.MULTILINE)
 
@@ -60,24 +64,43 @@ def macros(command):
     return dict(argument[2:].partition("=")[::2] for argument in command if argument.startswith("-D"))
 
 
+names_in = functools.cache(declared_names)
+
+
+def names_in_headers(path):
+    """What the project's headers declare that this file includes, directly or not."""
+    reached = set()
+    waiting = [path]
+    while waiting:
+        includes = INCLUDE.findall(waiting.pop().read_text(encoding="utf-8"))
+        # CMake makes some headers of NAME.h.in.
+        candidates = {ROOT / (name + ending) for name in includes for ending in ("", ".in")}
+        new = {header for header in candidates - reached if header.is_file()}
+        reached |= new
+        waiting += new
+    return {name for header in reached for name in names_in(header)}
+
+
 class Batch:
     def __init__(self, alone=False):
         self.alone = alone
         self.files = []
-        self.names = set()
+        self.names = set()  # those of the files that no header of theirs declares
+        self.header_names = set()
         self.imports = set()
         self.macros = {}
         self.command = []
 
-    def takes(self, names, imports, command):
+    def takes(self, names, headers, imports, command):
         if self.alone:
             return False
         agree = all(self.macros.get(name, value) == value for name, value in macros(command).items())
-        clash = names & (self.names | self.imports) or imports & self.names
+        clash = names & (self.names | self.imports | self.header_names) or (imports | headers) & self.names
         return agree and len(self.files) < MOST_FILES and not clash
 
-    def add(self, path, names, imports, command):
+    def add(self, path, names, headers, imports, command):
         self.files.append(path)
+        self.header_names |= headers
         self.names |= names
         self.imports |= imports
         self.macros |= macros(command)
@@ -93,15 +116,16 @@ def put_together(files):
     """Batches; `files` are (path, command) pairs."""
     batches = []
     for path, command in files:
-        names = declared_names(path) - {"main"}
+        headers = names_in_headers(path)
+        names = declared_names(path) - headers - {"main"}
         imports = imported_names(path)
         if LONERS.search(path.read_text(encoding="utf-8")):
             batch = Batch(alone=True)
         else:
-            batch = next((batch for batch in batches if batch.takes(names, imports, command)), Batch())
+            batch = next((batch for batch in batches if batch.takes(names, headers, imports, command)), Batch())
         if batch not in batches:
             batches.append(batch)
-        batch.add(path, names, imports, command)
+        batch.add(path, names, headers, imports, command)
     return batches
 
 

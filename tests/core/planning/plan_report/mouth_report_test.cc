@@ -38,8 +38,8 @@ TEST(MouthReportTest, PointsArePlacesOfTheCt) {
   EXPECT_EQ(json["sure"], false);
   EXPECT_EQ(json["says"].size(), 3U);
   ASSERT_EQ(json["points_mm"].size(), 4U);
-  EXPECT_EQ(json["points_mm"][0], nlohmann::json({3.0, -4.0, 8.0}));
-  EXPECT_EQ(json["right_corner"]["at_mm"], nlohmann::json({3.0, -4.0, 8.0}));
+  EXPECT_EQ(json["points_mm"][0], nlohmann::ordered_json({3.0, -4.0, 8.0}));
+  EXPECT_EQ(json["right_corner"]["at_mm"], nlohmann::ordered_json({3.0, -4.0, 8.0}));
   EXPECT_EQ(json["right_corner"]["from_midline_mm"], 2);
   EXPECT_EQ(json["right_corner"]["sure"], true);
   EXPECT_EQ(json["left_corner"]["sure"], false);
