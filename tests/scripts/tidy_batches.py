@@ -85,7 +85,8 @@ class Batch:
     def __init__(self, alone=False):
         self.alone = alone
         self.files = []
-        self.names = set()  # those of the files that no header of theirs declares
+        self.names = set()
+        self.own_names = set()  # that no header of their file declares
         self.header_names = set()
         self.imports = set()
         self.macros = {}
@@ -95,13 +96,15 @@ class Batch:
         if self.alone:
             return False
         agree = all(self.macros.get(name, value) == value for name, value in macros(command).items())
-        clash = names & (self.names | self.imports | self.header_names) or (imports | headers) & self.names
+        clash = names & (self.names | self.imports) or imports & self.names
+        clash |= (names - headers) & self.header_names or headers & self.own_names
         return agree and len(self.files) < MOST_FILES and not clash
 
     def add(self, path, names, headers, imports, command):
         self.files.append(path)
         self.header_names |= headers
         self.names |= names
+        self.own_names |= names - headers
         self.imports |= imports
         self.macros |= macros(command)
         # "-isystem FOLDER" is two words that stay together.
@@ -117,7 +120,7 @@ def put_together(files):
     batches = []
     for path, command in files:
         headers = names_in_headers(path)
-        names = declared_names(path) - headers - {"main"}
+        names = declared_names(path) - {"main"}
         imports = imported_names(path)
         if LONERS.search(path.read_text(encoding="utf-8")):
             batch = Batch(alone=True)

@@ -23,6 +23,9 @@ using Eigen::Index;
 
 // One place in five may be hidden, by a hair or a scar, without a doubt about the rest.
 constexpr double kSureShare = 0.8;
+// Limits of a line that a person gives.
+constexpr double kGivenStepMm = 0.5;
+constexpr double kGivenHalfWidthMm = 45;
 
 // The red of a lip is about 8 mm high: the lip's foremost skin is no farther from the line.
 constexpr double kLipHeightMm = 8;
@@ -449,7 +452,30 @@ std::string DescribeStart(MouthStart start) {
 
 }  // namespace
 
-bool MouthLine::line_is_sure() const { return seen_share >= kSureShare; }
+bool MouthLine::line_is_sure() const { return given || seen_share >= kSureShare; }
+
+absl::StatusOr<MouthLine> MouthLineThrough(const std::vector<Eigen::Vector3d>& places_mm,
+                                           const Landmarks& landmarks) {
+  const FaceAxes axes(landmarks);
+  MouthLine line;
+  line.given = true;
+  for (const Eigen::Vector3d& place : places_mm) {
+    const FaceCoordinates at = axes.Of(place);
+    const bool is_left =
+        line.points.empty() || at.left >= line.points.back().at.left + kGivenStepMm;
+    if (!is_left || !(std::abs(at.left) <= kGivenHalfWidthMm)) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "point %d of the mouth line lies %.1f mm left of the midline; give points from the right "
+          "corner to the left one, %g mm or more apart and within %g mm of the midline",
+          line.points.size(), at.left, kGivenStepMm, kGivenHalfWidthMm));
+    }
+    line.points.push_back({.at = at});
+  }
+  if (line.points.size() < 3) {
+    return absl::InvalidArgumentError("a mouth line has three points or more");
+  }
+  return line;
+}
 
 absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& measured, double start_up) {
   const FaceRelief relief = SmoothAlongLeft(measured);
@@ -496,6 +522,7 @@ absl::StatusOr<MouthLine> FindMouthLine(const HeadSegmentation& head, const Land
 }
 
 std::vector<std::string> DescribeMouthLine(const MouthLine& line) {
+  if (line.given) return {"The mouth line was given by the recipe."};
   const double width_mm = line.points.back().at.left - line.points.front().at.left;
   std::string found = absl::StrFormat(
       "The mouth line %s: lips or a notch of %g mm or more between them are seen along %.0f %% of "

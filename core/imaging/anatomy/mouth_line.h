@@ -57,6 +57,7 @@ struct MouthLine {
   double seen_share = 0;    // of the points
   double parted_share = 0;  // of the points
   bool near_metal = false;  // metal within 25 mm of a point: streaks may blur the skin
+  bool given = false;       // by a person: the rest is not known, and the line is sure
 
   // Whether 80 % of the line are seen.
   bool line_is_sure() const;
@@ -74,6 +75,13 @@ absl::StatusOr<MouthLine> FindMouthLine(const FaceRelief& relief, double start_u
 //
 // Errors: those of FindMouthLine.
 absl::StatusOr<MouthLine> FindMouthLine(const HeadSegmentation& head, const Landmarks& landmarks);
+
+// A line that a person gives, LPS, from right to left.
+//
+// Errors: InvalidArgument unless each of its points, three or more, lies 0.5 mm or more left of the
+// one before and all lie within 45 mm of the midline.
+absl::StatusOr<MouthLine> MouthLineThrough(const std::vector<Eigen::Vector3d>& places_mm,
+                                           const Landmarks& landmarks);
 
 // What was found and how sure it is, in sentences for a report: the line, then each corner.
 std::vector<std::string> DescribeMouthLine(const MouthLine& line);

@@ -214,6 +214,17 @@ absl::StatusOr<SoftTissueMesh> Mesh(const SoftTissue& soft_tissue, const Landmar
   return MeshSoftTissue(soft_tissue.field, options);
 }
 
+// The seam on which the lips will part, where the recipe wants it.
+absl::StatusOr<std::optional<SeamInMesh>> MakeSeam(const Anatomy& anatomy, const Recipe& recipe,
+                                                   SoftTissueMesh* mesh) {
+  if (!recipe.lips.part) return std::nullopt;
+  TF_ASSIGN_OR_RETURN(const MouthLine line,
+                      ChooseMouthLine(recipe.lips, anatomy.head, anatomy.landmarks));
+  TF_ASSIGN_OR_RETURN(LipSeam seam, LipSeam::Create(line, anatomy.parts.labels, anatomy.landmarks));
+  TF_ASSIGN_OR_RETURN(SeamInMesh in_mesh, PutSeamInMesh(std::move(seam), mesh));
+  return in_mesh;
+}
+
 double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
   if (recipe.contact_band_mm) return *recipe.contact_band_mm;
   double largest_move_mm = 0;
@@ -278,6 +289,7 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                       FindSoftTissue(anatomy, bone.labels, recipe, &progress));
   TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh,
                       Mesh(soft_tissue, anatomy.landmarks, recipe, options.threads, &progress));
+  TF_ASSIGN_OR_RETURN(const std::optional<SeamInMesh> seam, MakeSeam(anatomy, recipe, &mesh));
   TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
                                                         recipe, options.threads, &progress));
   progress.Begin("comparing the mesh with the CT's skin", 0.96, 0.98);
@@ -286,6 +298,15 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                                           {mesh.surface, description.released.regions,
                                            soft_tissue.region, &soft_tissue.outside_air},
                                           ct.spacing_mm.maxCoeff(), options.threads));
+  std::optional<PartedLips> lips;
+  if (seam) {
+    TF_ASSIGN_OR_RETURN(lips, PartLips(*seam,
+                                       {.parts = anatomy.parts.labels,
+                                        .soft_tissue = soft_tissue.labels,
+                                        .up = anatomy.frame.superior,
+                                        .vestibule_mm = recipe.lips.vestibule_mm},
+                                       &mesh, &description.released.regions));
+  }
   progress.Begin("extracting surfaces for the viewer", 0.98, 1);
   TF_ASSIGN_OR_RETURN(std::vector<CaseSurface> viewer_surfaces,
                       MakeViewerSurfaces({.head = anatomy.head,
@@ -317,6 +338,7 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .num_inverted = description.released.num_inverted,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage),
+                   .lips = std::move(lips),
                    .frankfort = anatomy.frankfort,
                    .head_frame = std::move(anatomy.frame),
                    .viewer_surfaces = std::move(viewer_surfaces)};

@@ -24,6 +24,7 @@
 #include "core/mechanics/problem/plan_problem.h"
 #include "core/planning/case_file/case_file.h"
 #include "core/planning/plan_building/frankfort.h"
+#include "core/planning/plan_building/lip_parting.h"
 #include "core/planning/plan_building/planning_regions.h"
 #include "core/planning/plan_building/recipe.h"
 #include "core/planning/plan_building/skin_coverage.h"
@@ -60,13 +61,14 @@ struct PlanBuild {
   std::vector<BuiltSegment> segments;
   SoftTissue soft_tissue;
   double contact_band_mm = 0;
-  SoftTissueMesh mesh;
+  SoftTissueMesh mesh;  // with the doubles of parted lips last, which its surface has not
   TetStiffness stiffness;
   PlanningRegions regions;
   int64_t num_released_by_trial = 0;  // of regions.freed_by_contact, by ReleaseTornContacts
   int64_t num_inverted = 0;           // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
+  std::optional<PartedLips> lips = {};               // where the recipe parts them
   std::optional<FrankfortLandmarks> frankfort = {};  // where they were found
   HeadFrame head_frame = {};
   std::vector<CaseSurface> viewer_surfaces = {};
@@ -87,7 +89,8 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
 
 // Writes into the folder, which exists:
 //   plan.json           the plan (docs/plan-format.md)
-//   head.vtu            the mesh; point arrays anatomy, skin_region; cell arrays mean_hu, voxels,
+//   head.vtu            the mesh; point arrays anatomy, skin_region, contact where the lips are
+//                       parted (the bits of lip_parting.h); cell arrays mean_hu, voxels,
 //                       tissue, youngs_modulus_pa
 //   segments/NAME.stl   the pieces of bone
 //   viewer.glb          what a viewer needs besides (core/planning/case_file/viewer_file.h)

@@ -52,6 +52,20 @@ Json UncertaintyJson(const FactorByCellData& factors) {
   return {{"youngs_modulus_factor_95", {{"by_cell_data", factors.name}, {"values", values}}}};
 }
 
+Json ContactRowJson(const ContactRow& row, const std::vector<BuiltSegment>& segments) {
+  Json json = {{"vertex", row.vertex}, {"normal", ToJson(row.normal)}};
+  if (row.other != ContactRow::kBone) {
+    json["other_vertex"] = row.other;
+  } else if (row.handle == ContactRow::kFixedBone) {
+    json["fixed"] = true;
+  } else {
+    json["handle"] = segments[static_cast<size_t>(row.handle)].cut.name;
+  }
+  if (row.gap_mm > 0) json["gap_mm"] = row.gap_mm;
+  if (row.bilateral) json["bilateral"] = true;
+  return json;
+}
+
 std::string PlanJson(const PlanBuild& build) {
   Json plan = {{"format", "tissueform-plan"},
                {"unit", "mm"},
@@ -68,6 +82,11 @@ std::string PlanJson(const PlanBuild& build) {
   }
   if (const auto factors = FactorsOf(build.recipe.tissues)) {
     plan["uncertainty"] = UncertaintyJson(*factors);
+  }
+  if (build.lips) {
+    for (const ContactRow& row : build.lips->rows) {
+      plan["contact"]["rows"].push_back(ContactRowJson(row, build.segments));
+    }
   }
   plan["version"] = LowestPlanVersion(plan);
   return plan.dump(2) + "\n";
@@ -100,9 +119,11 @@ Plan PlanOf(const PlanBuild& build) {
 
 TetMeshFile MeshFile(const PlanBuild& build) {
   const TetStiffness& stiffness = build.stiffness;
+  std::vector<Attribute> of_points = {{kAnatomyArray, 1, build.regions.anatomy},
+                                      {"skin_region", 1, build.regions.skin_region}};
+  if (build.lips) of_points.push_back({"contact", 1, build.lips->contact});
   return {.mesh = build.mesh.mesh,
-          .point_data = {{kAnatomyArray, 1, build.regions.anatomy},
-                         {"skin_region", 1, build.regions.skin_region}},
+          .point_data = std::move(of_points),
           .cell_data = {{"mean_hu", 1, stiffness.mean_hu},
                         {"voxels", 1, stiffness.voxels},
                         {kTissueArray, 1, stiffness.tissue},

@@ -187,10 +187,10 @@ absl::StatusOr<PlanningRegions> AssignRegions(const TetMesh& mesh, Eigen::Index 
   PlanningRegions regions;
   regions.anatomy.assign(num_vertices, kFree);
   regions.on_skin.assign(num_vertices, false);
-  regions.on_bone.assign(num_vertices, false);
+  regions.bone.assign(num_vertices, 0);
   for (size_t v = 0; v < touched.size(); ++v) {
     regions.on_skin[v] = touched[v] == kAir;
-    regions.on_bone[v] = IsBone(touched[v]);
+    regions.bone[v] = IsBone(touched[v]) ? touched[v] : 0;
     regions.anatomy[v] = touched[v] == kCut ? kFixed : IsBone(touched[v]) ? touched[v] : kFree;
   }
   const auto constrained = [&regions] {

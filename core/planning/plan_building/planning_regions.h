@@ -30,7 +30,8 @@ struct PlanningRegions {
   std::vector<uint8_t> anatomy;      // #V
   std::vector<uint8_t> skin_region;  // #V, SkinRegion; 0 also inside and off the skin
   std::vector<bool> on_skin;         // #V: facing air, not a cut of any kind
-  std::vector<bool> on_bone;         // #V: on bone of either kind, in the contact band too
+  std::vector<uint8_t> bone;         // #V: what bone it lies on, in the contact band too, as in
+                                     // `anatomy`; 0: none
 
   int64_t freed_by_contact = 0;  // vertices on bone that were left free
 };

@@ -135,6 +135,16 @@ absl::StatusOr<RecipeMesh> ToMesh(const Json& json) {
   return mesh;
 }
 
+RecipeLips ToLips(const Json& json) {
+  RecipeLips lips;
+  lips.part = json.value("part", lips.part);
+  lips.vestibule_mm = json.value("vestibule_mm", lips.vestibule_mm);
+  for (const Json& place : json.value("mouth_line_mm", Json::array())) {
+    lips.mouth_line_mm.push_back(VectorFromJson(place));
+  }
+  return lips;
+}
+
 absl::StatusOr<StiffnessTable> ToTissues(const Json& json) {
   StiffnessTable table;
   for (const Json& tissue : json) {
@@ -172,6 +182,7 @@ absl::StatusOr<Recipe> ToRecipe(const Json& json) {
   TF_RETURN_IF_ERROR(ReadHeadFrame(json.value("head_frame", nothing), &recipe));
   recipe.soft_tissue = ToSoftTissue(json.value("soft_tissue", nothing));
   TF_ASSIGN_OR_RETURN(recipe.mesh, ToMesh(json.value("mesh", nothing)));
+  recipe.lips = ToLips(json.value("lips", nothing));
   if (json.contains("contact_band_mm")) {
     recipe.contact_band_mm = json.at("contact_band_mm").get<double>();
   }
@@ -204,6 +215,14 @@ Json CtToJson(const CtReadOptions& options) {
   if (options.series_number) json["series_number"] = *options.series_number;
   if (options.join_series != JoinSeries::kAuto) {
     json["join_series"] = options.join_series == JoinSeries::kAlways ? "always" : "never";
+  }
+  return json;
+}
+
+Json LipsToJson(const RecipeLips& lips) {
+  Json json = {{"part", lips.part}, {"vestibule_mm", lips.vestibule_mm}};
+  for (const Eigen::Vector3d& place : lips.mouth_line_mm) {
+    json["mouth_line_mm"].push_back(ToJson(place));
   }
   return json;
 }
@@ -295,6 +314,7 @@ std::string RecipeToJson(const Recipe& recipe) {
   if (recipe.contact_band_mm) json["contact_band_mm"] = *recipe.contact_band_mm;
   // Only where it is not the default, so that a recipe of version 1 stays one.
   if (!recipe.metal.correct) json["metal"] = "off";
+  if (recipe.lips.part) json["lips"] = LipsToJson(recipe.lips);
   if (recipe.metal.threshold_hu) json["metal"] = *recipe.metal.threshold_hu;
   json["version"] = RecipeSchema().LowestVersion(json);
   return json.dump(2);

@@ -37,6 +37,13 @@ struct RecipeMesh {
   double min_dihedral_deg = 10;
 };
 
+// Whether and where the lips part.
+struct RecipeLips {
+  bool part = false;
+  std::vector<Eigen::Vector3d> mouth_line_mm;  // LPS, from right to left; empty: found in the CT
+  double vestibule_mm = 10;  // so far from the mouth line tissue slides on the jaws
+};
+
 // How a planning model is made from a CT of a head (docs/recipe-format.md). Coordinates are LPS,
 // mm.
 struct Recipe {
@@ -54,6 +61,7 @@ struct Recipe {
   std::optional<Plane> horizontal;
   SoftTissueOptions soft_tissue;
   RecipeMesh mesh;
+  RecipeLips lips;
   std::optional<double> contact_band_mm;
   StiffnessTable tissues = DefaultStiffnessTable();
   double poisson_ratio = 0.45;

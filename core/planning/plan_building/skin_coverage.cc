@@ -233,7 +233,7 @@ void CountBone(const MeshedSkin& mesh, const TriangleMesh& skin, int threads,
     coverage->mesh_skin_mm2 += area_mm2;
     const auto triangle = mesh.surface.triangles().row(f);
     const auto held = std::count_if(triangle.begin(), triangle.end(), [&](int32_t v) {
-      return mesh.regions.on_bone[v] || mesh.regions.anatomy[v] != 0;
+      return mesh.regions.bone[v] != 0 || mesh.regions.anatomy[v] != 0;
     });
     if (held >= 2) coverage->mesh_skin_on_bone_mm2 += area_mm2;
   }

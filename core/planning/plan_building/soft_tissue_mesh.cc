@@ -88,11 +88,9 @@ double EnclosedVolume(const TriangleMesh& surface) {
 
 void Measure(const TriangleMesh& isosurface, int threads, SoftTissueMesh* made) {
   SoftTissueMeshReport& report = made->report;
-  report.surface_vertices = made->surface.num_vertices();
+  MeasureTets(made);
   const auto parts = FindSurfaceParts(made->surface).volumes_mm3;
   report.cavities = std::count_if(parts.begin(), parts.end(), [](double v) { return v < 0; });
-  report.quality = SummarizeTetQuality(made->mesh);
-  report.tets_below_3_deg = CountBelow(made->mesh, 3);
   report.grid_volume_mm3 = EnclosedVolume(isosurface);
   report.volume_ratio = report.quality.total_volume_mm3 / report.grid_volume_mm3;
   report.to_isosurface =
@@ -120,6 +118,12 @@ absl::StatusOr<SoftTissueMesh> Attempt(const TriangleMesh& isosurface,
 }
 
 }  // namespace
+
+void MeasureTets(SoftTissueMesh* made) {
+  made->report.surface_vertices = made->surface.num_vertices();
+  made->report.quality = SummarizeTetQuality(made->mesh);
+  made->report.tets_below_3_deg = CountBelow(made->mesh, 3);
+}
 
 absl::StatusOr<SoftTissueMesh> MeshSoftTissue(const VoxelGrid<float>& heights,
                                               const SoftTissueMeshOptions& options) {

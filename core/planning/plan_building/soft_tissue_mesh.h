@@ -69,6 +69,10 @@ struct SoftTissueMesh {
   SoftTissueMeshReport report;
 };
 
+// Measures anew what the report says of the tets and the surface's vertices, for a mesh that was
+// changed.
+void MeasureTets(SoftTissueMesh* made);
+
 // Tets in the soft tissue: `heights` is positive inside it, about the distance to its boundary in
 // mm. The boundary becomes a closed surface (ExtractSurface), remeshed (RemeshSurface) and filled
 // with tets (Tetrahedralize). Of parts that hang together nowhere the largest is meshed.

@@ -95,8 +95,8 @@ Colour SkinVertexColour(const PlanningRegions& regions, size_t vertex) {
 Colour VertexColour(const PlanningRegions& regions, size_t vertex) {
   const uint8_t anatomy = regions.anatomy[vertex];
   if (anatomy >= kFirstSegment) return SegmentColour(static_cast<size_t>(anatomy - kFirstSegment));
-  if (anatomy == kFixedBone) return regions.on_bone[vertex] ? kFixedBoneColour : kCutColour;
-  return regions.on_bone[vertex] ? kFreedColour : kTissueColour;
+  if (anatomy == kFixedBone) return regions.bone[vertex] != 0 ? kFixedBoneColour : kCutColour;
+  return regions.bone[vertex] != 0 ? kFreedColour : kTissueColour;
 }
 
 std::vector<Colour> TissueColours(const PlanBuild& build) {
@@ -133,7 +133,7 @@ std::vector<Scene> ConstraintScenes(const PlanBuild& build) {
   const PlanningRegions& regions = build.regions;
   const auto on_bone = [&regions](const std::array<size_t, 3>& corners) {
     return std::any_of(corners.begin(), corners.end(), [&regions](size_t vertex) {
-      return regions.on_bone[vertex] || regions.anatomy[vertex] >= kFirstSegment;
+      return regions.bone[vertex] != 0 || regions.anatomy[vertex] >= kFirstSegment;
     });
   };
   const auto colour = [&regions](size_t vertex) { return VertexColour(regions, vertex); };

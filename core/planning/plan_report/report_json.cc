@@ -131,7 +131,8 @@ Json RegionsJson(const PlanBuild& build) {
           {"free_vertices", CountOf(regions.anatomy, 0)},
           {"fixed_vertices", CountOf(regions.anatomy, kFixedBone)},
           {"handle_vertices", handles},
-          {"vertices_on_bone", std::count(regions.on_bone.begin(), regions.on_bone.end(), true)},
+          {"vertices_on_bone",
+           regions.bone.size() - std::count(regions.bone.begin(), regions.bone.end(), 0)},
           {"vertices_on_skin", std::count(regions.on_skin.begin(), regions.on_skin.end(), true)},
           {"skin_region_vertices", skin}};
 }

@@ -101,7 +101,7 @@ struct BoneDepths {
 BoneDepths DepthsOfBone(const PlanBuild& build, const TriangleMesh& outer_skin) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index v = 0; v < build.mesh.surface.num_vertices(); ++v) {
-    if (build.regions.on_bone[static_cast<size_t>(v)]) rows.push_back(v);
+    if (build.regions.bone[static_cast<size_t>(v)] != 0) rows.push_back(v);
   }
   BoneDepths bone;
   bone.places = build.mesh.surface.positions()(rows, Eigen::all);

@@ -69,7 +69,7 @@ TEST(PlanningRegionsTest, BoneHoldsWhatTouchesItAndAirNothing) {
     const double z = column.Height(v);
     const int expected = z == 0 ? kFixedBone : z == 20 ? kFirstSegment : 0;
     EXPECT_EQ(regions.anatomy[v], expected) << z;
-    EXPECT_EQ(regions.on_bone[v], expected != 0) << z;
+    EXPECT_EQ(regions.bone[v], expected) << z;
     EXPECT_EQ(regions.on_skin[v], expected == 0) << z;
   }
   EXPECT_EQ(regions.freed_by_contact, 0);

@@ -66,7 +66,7 @@ class BallMesh {
     surface_ = ExtractSurface(field).value();
     regions_.anatomy.assign(static_cast<size_t>(surface_.num_vertices()), 0);
     regions_.on_skin.assign(regions_.anatomy.size(), true);
-    regions_.on_bone.assign(regions_.anatomy.size(), false);
+    regions_.bone.assign(regions_.anatomy.size(), 0);
   }
 
   Eigen::Vector3d Vertex(size_t v) const {
@@ -146,7 +146,7 @@ TEST(SkinCoverageTest, AGapIsMeasuredToItsRim) {
 TEST(SkinCoverageTest, BoneInTheSkinIsCounted) {
   BallMesh mesh(kBallMm);
   for (size_t v = 0; v < mesh.regions().on_skin.size(); ++v) {
-    if (mesh.Vertex(v).x() > 20) mesh.regions().on_bone[v] = true;
+    if (mesh.Vertex(v).x() > 20) mesh.regions().bone[v] = 1;
   }
   ASSERT_OK_AND_ASSIGN(const SkinCoverage coverage, mesh.Coverage(RegionAbove(-500)));
   EXPECT_NEAR(coverage.mesh_skin_on_bone_mm2 / coverage.mesh_skin_mm2, 0.25, 0.01);

@@ -341,7 +341,7 @@ TEST_F(WholeFaceTest, ANoseThatTheScannersCircleCutsHasNoSkinThereAndThatIsTold)
     ++at_cut;
     EXPECT_FALSE(face.regions.on_skin[static_cast<size_t>(v)]);
     EXPECT_EQ(face.regions.skin_region[static_cast<size_t>(v)], 0);
-    if (face.regions.on_bone[static_cast<size_t>(v)]) continue;
+    if (face.regions.bone[static_cast<size_t>(v)] != 0) continue;
     EXPECT_EQ(face.regions.anatomy[static_cast<size_t>(v)], 0) << "held at the cut";
   }
   EXPECT_GT(at_cut, 10);

@@ -1,0 +1,261 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/plan_building/lip_parting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
+
+#include "core/base/status_macros.h"
+#include "core/imaging/anatomy/skin_regions.h"
+#include "core/imaging/anatomy/soft_tissue.h"
+#include "core/mesh/seam/seam_sheet.h"
+#include "core/mesh/tet_topology.h"
+
+namespace tissueform {
+namespace {
+
+// Tissue with a wider gap before a jaw is not asked whether it meets it.
+constexpr double kWidestGapMm = 5;
+// Of the faces of a jaw that look at the lips, against those that look at the tongue, up or down.
+constexpr double kFacesLips = 0.3;
+// Behind the front of a jaw, whose polynomial is true to about 2 mm.
+constexpr double kBehindFrontMm = 4;
+// How far from a vertex the voxel of the jaw is looked for that it lies on.
+constexpr int kSearchVoxels = 3;
+
+// Normals of the boundary at its vertices, out of the tissue, of length 1 or 0; #V by 3.
+Positions BoundaryNormals(const TetMesh& mesh) {
+  Positions normals = Positions::Zero(mesh.num_vertices(), 3);
+  const Positions& at = mesh.positions();
+  const TriangleIndices facets = BoundaryFacets(mesh);
+  for (const auto& facet : facets.rowwise()) {
+    const Eigen::Vector3d from = at.row(facet[0]);
+    const Eigen::Vector3d to_second = at.row(facet[1]).transpose() - from;
+    const Eigen::Vector3d to_third = at.row(facet[2]).transpose() - from;
+    const Eigen::RowVector3d twice_area = to_second.cross(to_third).transpose();
+    for (const int32_t v : facet) normals.row(v) += twice_area;
+  }
+  normals.rowwise().normalize();
+  return normals;
+}
+
+// The value at the nearest voxel within kSearchVoxels that `wanted` likes; 0 where there is no such
+// voxel.
+template <typename Wanted>
+uint8_t NearestLabel(const LabelGrid& labels, const Eigen::Vector3d& place, Wanted wanted) {
+  const Eigen::Vector3d at = labels.geometry.ToVoxels(place);
+  const Eigen::Vector3i centre = at.array().round().cast<int>();
+  uint8_t nearest = 0;
+  double smallest = kSearchVoxels + 1.0;
+  for (int z = centre.z() - kSearchVoxels; z <= centre.z() + kSearchVoxels; ++z) {
+    for (int y = centre.y() - kSearchVoxels; y <= centre.y() + kSearchVoxels; ++y) {
+      for (int x = centre.x() - kSearchVoxels; x <= centre.x() + kSearchVoxels; ++x) {
+        if (!labels.geometry.Contains(x, y, z) || !wanted(labels.At(x, y, z))) continue;
+        const double distance = (Eigen::Vector3d(x, y, z) - at).norm();
+        if (distance < smallest) {
+          smallest = distance;
+          nearest = labels.At(x, y, z);
+        }
+      }
+    }
+  }
+  return nearest;
+}
+
+bool IsBoneLabel(uint8_t label) { return label != 0 && label != kSoftTissue; }
+bool IsJaw(uint8_t part) { return part == kCranium || part == kMandible; }
+
+// What of a jaw lies at a vertex, or before it.
+struct JawAt {
+  uint8_t bone = 0;  // label of the soft tissue's grid: 1 stays, 2.. segments
+  uint8_t jaw = 0;   // kCranium or kMandible; 0: none
+  double gap_mm = 0;
+};
+
+class ContactRows {
+ public:
+  ContactRows(const LipSeam& seam, const VestibuleAnatomy& anatomy, const TetMesh& mesh,
+              const PlanningRegions& regions)
+      : seam_(seam),
+        anatomy_(anatomy),
+        mesh_(mesh),
+        regions_(regions),
+        normals_(BoundaryNormals(mesh)) {}
+
+  // `side` of every vertex of the welded mesh.
+  std::vector<ContactRow> Run(const std::vector<int8_t>& side, const PartedMesh& parted) const {
+    std::vector<ContactRow> rows;
+    const auto doubles = static_cast<Eigen::Index>(parted.original_of_double.size());
+    std::vector<bool> is_doubled(side.size(), false);
+    for (const int32_t v : parted.original_of_double) is_doubled[v] = true;
+    for (Eigen::Index v = 0; v < mesh_.num_vertices(); ++v) {
+      const auto at = static_cast<size_t>(v);
+      if (is_doubled[at]) {
+        AddBoneRow(v, 1, &rows);
+      } else if (side[at] != 0) {
+        AddBoneRow(v, side[at], &rows);
+      }
+    }
+    for (Eigen::Index k = 0; k < doubles; ++k) {
+      const size_t before = rows.size();
+      AddBoneRow(parted.original_of_double[static_cast<size_t>(k)], -1, &rows);
+      const auto number = static_cast<int32_t>(mesh_.num_vertices() + k);
+      for (size_t row = before; row < rows.size(); ++row) rows[row].vertex = number;
+    }
+    AddLipRows(parted, &rows);
+    return rows;
+  }
+
+ private:
+  bool IsInVestibule(const Eigen::Vector3d& place) const {
+    return seam_.IsBeside(place, anatomy_.vestibule_mm) &&
+           std::abs(seam_.HeightMm(place)) <= anatomy_.vestibule_mm;
+  }
+
+  JawAt BoneUnder(Eigen::Index v) const {
+    const Eigen::Vector3d place = mesh_.positions().row(v);
+    const uint8_t bone = regions_.bone[static_cast<size_t>(v)];
+    if (bone != 0) return {.bone = bone, .jaw = NearestLabel(anatomy_.parts, place, IsJaw)};
+    return regions_.on_skin[static_cast<size_t>(v)] ? BoneBehindAir(v, place) : JawAt{};
+  }
+
+  // Through the air before a vertex, as the boundary faces.
+  JawAt BoneBehindAir(Eigen::Index v, const Eigen::Vector3d& place) const {
+    const GridGeometry& geometry = anatomy_.soft_tissue.geometry;
+    const Eigen::Vector3d outward = normals_.row(v);
+    const double step_mm = geometry.spacing_mm / 4;
+    for (double gap_mm = step_mm; gap_mm <= kWidestGapMm; gap_mm += step_mm) {
+      const Eigen::Vector3d ahead = place + gap_mm * outward;
+      const Eigen::Vector3i voxel = geometry.ToVoxels(ahead).array().round().cast<int>();
+      if (!geometry.Contains(voxel.x(), voxel.y(), voxel.z())) return {};
+      const uint8_t label = anatomy_.soft_tissue.At(voxel.x(), voxel.y(), voxel.z());
+      if (!IsBoneLabel(label)) continue;
+      return {.bone = label,
+              .jaw = NearestLabel(anatomy_.parts, ahead, IsJaw),
+              .gap_mm = gap_mm - step_mm};
+    }
+    return {};
+  }
+
+  void AddBoneRow(Eigen::Index v, int side, std::vector<ContactRow>* rows) const {
+    const Eigen::Vector3d place = mesh_.positions().row(v);
+    if (!IsInVestibule(place)) return;
+    const JawAt under = BoneUnder(v);
+    if (under.jaw == 0) return;
+    const Eigen::Vector3d outward = seam_.Outward(place, under.jaw, anatomy_.up);
+    const bool faces_lips = -normals_.row(v).dot(outward.transpose()) > kFacesLips &&
+                            seam_.BeforeArchMm(place, under.jaw) > -kBehindFrontMm;
+    if (!faces_lips) return;
+    const bool is_own = (under.jaw == kCranium) == (side > 0);
+    rows->push_back(
+        {.vertex = static_cast<int32_t>(v),
+         .handle = under.bone < kFirstSegment ? ContactRow::kFixedBone : under.bone - kFirstSegment,
+         .normal = outward,
+         .gap_mm = under.gap_mm,
+         .bilateral = is_own && regions_.bone[static_cast<size_t>(v)] != 0});
+  }
+
+  void AddLipRows(const PartedMesh& parted, std::vector<ContactRow>* rows) const {
+    Positions up = Positions::Zero(mesh_.num_vertices(), 3);
+    const Positions& at = mesh_.positions();
+    for (const auto& facet : parted.wall.rowwise()) {
+      const Eigen::Vector3d from = at.row(facet[0]);
+      const Eigen::Vector3d to_second = at.row(facet[1]).transpose() - from;
+      const Eigen::Vector3d to_third = at.row(facet[2]).transpose() - from;
+      for (const int32_t v : facet) up.row(v) += to_second.cross(to_third).transpose();
+    }
+    for (size_t k = 0; k < parted.original_of_double.size(); ++k) {
+      const int32_t original = parted.original_of_double[k];
+      rows->push_back(
+          {.vertex = original,
+           .other = static_cast<int32_t>(mesh_.num_vertices()) + static_cast<int32_t>(k),
+           .normal = up.row(original).transpose().normalized()});
+    }
+  }
+
+  const LipSeam& seam_;
+  const VestibuleAnatomy& anatomy_;
+  const TetMesh& mesh_;  // not yet parted
+  const PlanningRegions& regions_;
+  Positions normals_;
+};
+
+std::vector<uint8_t> BitsOf(const std::vector<ContactRow>& rows, Eigen::Index num_vertices) {
+  std::vector<uint8_t> bits(static_cast<size_t>(num_vertices), 0);
+  for (const ContactRow& row : rows) {
+    if (row.other != ContactRow::kBone) {
+      bits[row.vertex] |= kMeetsOtherLip;
+      bits[row.other] |= kMeetsOtherLip;
+    } else {
+      bits[row.vertex] |= row.bilateral ? kSlides : kMeetsBone;
+    }
+  }
+  return bits;
+}
+
+void AppendDoubles(const std::vector<int32_t>& originals, PlanningRegions* regions) {
+  for (const int32_t v : originals) {
+    const auto at = static_cast<size_t>(v);
+    regions->anatomy.push_back(regions->anatomy[at]);
+    regions->bone.push_back(regions->bone[at]);
+    regions->on_skin.push_back(regions->on_skin[at]);
+    const bool is_skin = regions->skin_region[at] != 0;
+    regions->skin_region.push_back(is_skin ? static_cast<uint8_t>(SkinRegion::kLowerLip) : 0);
+    if (is_skin) regions->skin_region[at] = static_cast<uint8_t>(SkinRegion::kUpperLip);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<MouthLine> ChooseMouthLine(const RecipeLips& lips, const HeadSegmentation& head,
+                                          const Landmarks& landmarks) {
+  if (!lips.mouth_line_mm.empty()) return MouthLineThrough(lips.mouth_line_mm, landmarks);
+  absl::StatusOr<MouthLine> found = FindMouthLine(head, landmarks);
+  if (found.ok()) return found;
+  return absl::InvalidArgumentError(
+      absl::StrCat("the lips cannot be parted: ", found.status().message(),
+                   "; give \"lips\": {\"mouth_line_mm\": ...} in the recipe, or leave it out"));
+}
+
+absl::StatusOr<SeamInMesh> PutSeamInMesh(LipSeam seam, SoftTissueMesh* made) {
+  const SeamSheet sheet = {
+      .height = [&seam](const Eigen::Vector3d& place) { return seam.HeightMm(place); },
+      .holds = [&seam](const Eigen::Vector3d& place) { return seam.Holds(place); }};
+  TF_ASSIGN_OR_RETURN(SeamedMesh seamed,
+                      ConformToSheet(made->mesh, made->surface.num_vertices(), sheet));
+  TriangleIndices facets = BoundaryFacets(seamed.mesh);
+  TF_ASSIGN_OR_RETURN(
+      made->surface,
+      TriangleMesh::Create(seamed.mesh.positions().topRows(seamed.boundary_vertices), facets));
+  made->mesh = std::move(seamed.mesh);
+  MeasureTets(made);
+  return SeamInMesh{.seam = std::move(seam),
+                    .side = std::move(seamed.side),
+                    .num_moved = seamed.num_moved,
+                    .num_added = seamed.num_added};
+}
+
+absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnatomy& anatomy,
+                                    SoftTissueMesh* made, PlanningRegions* regions) {
+  TF_ASSIGN_OR_RETURN(PartedMesh parted, PartMesh(made->mesh, seam.side));
+  std::vector<ContactRow> rows =
+      ContactRows(seam.seam, anatomy, made->mesh, *regions).Run(seam.side, parted);
+  AppendDoubles(parted.original_of_double, regions);
+  made->mesh = std::move(parted.mesh);
+  std::vector<uint8_t> contact = BitsOf(rows, made->mesh.num_vertices());
+  return PartedLips{.line = seam.seam.line(),
+                    .vestibule_mm = anatomy.vestibule_mm,
+                    .num_moved = seam.num_moved,
+                    .num_added = seam.num_added,
+                    .original_of_double = std::move(parted.original_of_double),
+                    .wall = std::move(parted.wall),
+                    .rows = std::move(rows),
+                    .contact = std::move(contact)};
+}
+
+}  // namespace tissueform
