@@ -21,8 +21,10 @@ namespace {
 
 // Tissue with a wider gap before a jaw is not asked whether it meets it.
 constexpr double kWidestGapMm = 5;
-// Of the faces of a jaw that look at the lips, against those that look at the tongue, up or down.
-constexpr double kFacesLips = 0.3;
+// Cosines between the normal of tissue's boundary and that of the arch. Tissue between two teeth
+// slides as that before them does: were it held, it would hold the lips. Not so behind the teeth.
+constexpr double kFacesLips = -0.5;
+constexpr double kFacesLipsThroughAir = 0.3;
 // Behind the front of a jaw, whose polynomial is true to about 2 mm.
 constexpr double kBehindFrontMm = 4;
 // How far from a vertex the voxel of the jaw is looked for that it lies on.
@@ -148,8 +150,10 @@ class ContactRows {
     const JawAt under = BoneUnder(v);
     if (under.jaw == 0) return;
     const Eigen::Vector3d outward = seam_.Outward(place, under.jaw, anatomy_.up);
-    const bool faces_lips = -normals_.row(v).dot(outward.transpose()) > kFacesLips &&
-                            seam_.BeforeArchMm(place, under.jaw) > -kBehindFrontMm;
+    const bool touches = regions_.bone[static_cast<size_t>(v)] != 0;
+    const bool faces_lips =
+        -normals_.row(v).dot(outward.transpose()) > (touches ? kFacesLips : kFacesLipsThroughAir) &&
+        seam_.BeforeArchMm(place, under.jaw) > -kBehindFrontMm;
     if (!faces_lips) return;
     const bool is_own = (under.jaw == kCranium) == (side > 0);
     rows->push_back(
@@ -157,7 +161,7 @@ class ContactRows {
          .handle = under.bone < kFirstSegment ? ContactRow::kFixedBone : under.bone - kFirstSegment,
          .normal = outward,
          .gap_mm = under.gap_mm,
-         .bilateral = is_own && regions_.bone[static_cast<size_t>(v)] != 0});
+         .bilateral = is_own && touches});
   }
 
   void AddLipRows(const PartedMesh& parted, std::vector<ContactRow>* rows) const {
@@ -196,6 +200,18 @@ std::vector<uint8_t> BitsOf(const std::vector<ContactRow>& rows, Eigen::Index nu
     }
   }
   return bits;
+}
+
+// On the skin the lips meet at the seam.
+void NameLips(const LipSeam& seam, const TetMesh& mesh, PlanningRegions* regions) {
+  constexpr auto kUpper = static_cast<uint8_t>(SkinRegion::kUpperLip);
+  constexpr auto kLower = static_cast<uint8_t>(SkinRegion::kLowerLip);
+  for (Eigen::Index v = 0; v < mesh.num_vertices(); ++v) {
+    uint8_t& region = regions->skin_region[static_cast<size_t>(v)];
+    const bool is_lip = region == kUpper || region == kLower;
+    const Eigen::Vector3d place = mesh.positions().row(v);
+    if (is_lip) region = seam.HeightMm(place) < 0 ? kLower : kUpper;
+  }
 }
 
 void AppendDoubles(const std::vector<int32_t>& originals, PlanningRegions* regions) {
@@ -245,6 +261,7 @@ absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnato
   TF_ASSIGN_OR_RETURN(PartedMesh parted, PartMesh(made->mesh, seam.side));
   std::vector<ContactRow> rows =
       ContactRows(seam.seam, anatomy, made->mesh, *regions).Run(seam.side, parted);
+  NameLips(seam.seam, made->mesh, regions);
   AppendDoubles(parted.original_of_double, regions);
   made->mesh = std::move(parted.mesh);
   std::vector<uint8_t> contact = BitsOf(rows, made->mesh.num_vertices());

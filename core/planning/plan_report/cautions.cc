@@ -20,6 +20,16 @@ constexpr double kFlatNoseMm = 3;
 // Below, skin follows freely where the neck would hold it.
 constexpr double kLittleUnderChinMm = 15;
 
+std::vector<std::string> MouthCautions(const PlanBuild& build) {
+  if (!build.lips) {
+    return LipsCautions(MeasureLipContact(build.soft_tissue.labels, build.landmarks));
+  }
+  if (build.lips->line.line_is_sure()) return {};
+  return {
+      "The lips part along a line that is unsure: check the picture of the line between the lips, "
+      "and give \"mouth_line_mm\" in the recipe's \"lips\" where it is wrong."};
+}
+
 }  // namespace
 
 std::vector<std::string> Cautions(const PlanBuild& build) {
@@ -27,10 +37,7 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
   for (std::string& caution : CutCautions(build.coverage)) cautions.push_back(std::move(caution));
   for (std::string& caution : ObjectsCautions(build)) cautions.push_back(std::move(caution));
   for (std::string& caution : MetalCautions(build)) cautions.push_back(std::move(caution));
-  for (std::string& caution :
-       LipsCautions(MeasureLipContact(build.soft_tissue.labels, build.landmarks))) {
-    cautions.push_back(std::move(caution));
-  }
+  for (std::string& caution : MouthCautions(build)) cautions.push_back(std::move(caution));
   const double nose_mm = build.landmarks.nose_prominence_mm;
   if (NoseIsCut(build.coverage)) {
     cautions.push_back(

@@ -15,16 +15,16 @@ constexpr double kLeastWidthMm = 5;
 
 }  // namespace
 
-nlohmann::ordered_json LipsJson(const LipContact& contact) {
+nlohmann::ordered_json LipsJson(const LipContact& contact, bool parted) {
   nlohmann::ordered_json json = {{"examined_mm", contact.examined_mm},
                                  {"joined_mm", contact.width_mm},
                                  {"joined_mm2", contact.area_mm2},
                                  {"joined_depth_mm", contact.depth_mm}};
   if (contact.width_mm > 0) json["joined_at_mm"] = ToJson(contact.place_mm);
   json["joined_means"] =
-      "along the middle of the mouth, where no air separates the lips: the model treats them as "
-      "one piece "
-      "of tissue, which neither opens nor slides";
+      absl::StrCat("along the middle of the mouth, where no air separates the lips: the model ",
+                   parted ? "parts them along the mouth line"
+                          : "treats them as one piece of tissue, which neither opens nor slides");
   return json;
 }
 

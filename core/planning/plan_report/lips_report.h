@@ -13,10 +13,11 @@
 namespace tissueform {
 
 // The key "lips" of report.json (docs/recipe-format.md).
-nlohmann::ordered_json LipsJson(const LipContact& contact);
+// `parted`: whether the model parts them.
+nlohmann::ordered_json LipsJson(const LipContact& contact, bool parted);
 
-// Where the lips are one piece of tissue, and how large it is; nothing where they are parted on all
-// but 5 mm.
+// Where unparted lips are one piece of tissue, and how large it is; nothing where they are parted
+// on all but 5 mm.
 std::vector<std::string> LipsCautions(const LipContact& contact);
 
 }  // namespace tissueform

@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
+#include "core/mesh/tet_topology.h"
 #include "core/planning/json_values.h"
 
 namespace tissueform {
@@ -21,6 +23,10 @@ using Json = nlohmann::ordered_json;
 
 const Colour kSeenColour{0.10, 0.45, 0.75};
 const Colour kUnseenColour{0.90, 0.55, 0.10};
+
+const Colour kSlidesColour{0.25, 0.60, 0.35};
+const Colour kMeetsBoneColour{0.85, 0.25, 0.20};
+const Colour kMeetsLipColour{0.25, 0.40, 0.85};
 
 // From under the nose to the chin, so that the mouth fills the picture.
 constexpr double kShownMm = 40;
@@ -39,24 +45,20 @@ Json CornerJson(const FaceAxes& axes, const MouthLinePoint& point, MouthCornerRe
           {"sure", IsSure(reason)}};
 }
 
-// The skin's triangles about the mouth, with their vertices only: the camera fits all vertices.
-SurfaceLayer SkinAboutMouth(const SkinCoverage& coverage, const FaceAxes& axes,
-                            const FaceCoordinates& middle) {
-  SurfaceLayer layer{.positions = coverage.positions,
-                     .triangles = coverage.triangles,
-                     .edges = false,
-                     .smooth = true};
-  std::vector<int32_t> place_of(static_cast<size_t>(coverage.positions.rows()), -1);
+// The triangles that are wanted, with their vertices only: the camera fits all vertices.
+template <typename Wanted>
+SurfaceLayer Part(const Positions& positions, const TriangleIndices& triangles, Wanted wanted) {
+  SurfaceLayer layer{.positions = positions, .triangles = triangles};
+  std::vector<int32_t> place_of(static_cast<size_t>(positions.rows()), -1);
   int32_t num_vertices = 0;
   Eigen::Index kept = 0;
-  for (const auto& row : coverage.triangles.rowwise()) {
-    const FaceCoordinates at = axes.Of(coverage.positions.row(row[0]).transpose());
-    if (std::abs(at.left) > kShownMm || std::abs(at.up - middle.up) > kShownMm) continue;
+  for (const auto& row : triangles.rowwise()) {
+    if (!wanted({row[0], row[1], row[2]})) continue;
     for (Eigen::Index corner = 0; corner < 3; ++corner) {
       int32_t& place = place_of[static_cast<size_t>(row[corner])];
       if (place < 0) {
         place = num_vertices++;
-        layer.positions.row(place) = coverage.positions.row(row[corner]);
+        layer.positions.row(place) = positions.row(row[corner]);
       }
       layer.triangles(kept, corner) = place;
     }
@@ -64,6 +66,18 @@ SurfaceLayer SkinAboutMouth(const SkinCoverage& coverage, const FaceAxes& axes,
   }
   layer.positions.conservativeResize(num_vertices, 3);
   layer.triangles.conservativeResize(kept, 3);
+  return layer;
+}
+
+SurfaceLayer SkinAboutMouth(const SkinCoverage& coverage, const FaceAxes& axes,
+                            const FaceCoordinates& middle) {
+  SurfaceLayer layer =
+      Part(coverage.positions, coverage.triangles, [&](const std::array<int32_t, 3>& corners) {
+        const FaceCoordinates at = axes.Of(coverage.positions.row(corners[0]).transpose());
+        return std::abs(at.left) <= kShownMm && std::abs(at.up - middle.up) <= kShownMm;
+      });
+  layer.edges = false;
+  layer.smooth = true;
   return layer;
 }
 
@@ -124,6 +138,36 @@ std::vector<SurfaceLayer> LineLayers(const std::vector<Vector3d>& places, const 
           corner(places.front(), mouth.right_corner), corner(places.back(), mouth.left_corner)};
 }
 
+struct RowCounts {
+  int64_t sliding = 0;
+  int64_t bone = 0;
+  int64_t behind_air = 0;  // of `bone`
+  int64_t lips = 0;
+};
+RowCounts CountRows(const std::vector<ContactRow>& rows) {
+  RowCounts counts;
+  for (const ContactRow& row : rows) {
+    const bool is_bone = row.other == ContactRow::kBone;
+    counts.sliding += row.bilateral ? 1 : 0;
+    counts.bone += is_bone && !row.bilateral ? 1 : 0;
+    counts.behind_air += is_bone && row.gap_mm > 0 ? 1 : 0;
+    counts.lips += is_bone ? 0 : 1;
+  }
+  return counts;
+}
+
+// The triangles of the parted mesh's boundary all corners of which touch something in one way.
+SurfaceLayer Touching(const PlanBuild& build, uint8_t bit, const Colour& colour) {
+  SurfaceLayer layer = Part(build.mesh.mesh.positions(), BoundaryFacets(build.mesh.mesh),
+                            [&](const std::array<int32_t, 3>& corners) {
+                              return std::all_of(corners.begin(), corners.end(), [&](int32_t v) {
+                                return (build.lips->contact[static_cast<size_t>(v)] & bit) != 0;
+                              });
+                            });
+  layer.colour = colour;
+  return layer;
+}
+
 }  // namespace
 
 Json MouthJson(const absl::StatusOr<MouthLine>& mouth, const Landmarks& landmarks) {
@@ -166,6 +210,46 @@ std::vector<Scene> MouthScenes(const SkinCoverage& coverage, const Landmarks& la
 std::vector<LegendEntry> MouthLegend() {
   return {{"seen, and a corner that was found", kSeenColour},
           {"not seen, and a corner that is unsure", kUnseenColour}};
+}
+
+Json LipContactJson(const std::optional<PartedLips>& lips) {
+  if (!lips) return nullptr;
+  const RowCounts counts = CountRows(lips->rows);
+  const std::string text = absl::StrFormat(
+      "The lips part along this line. Within %g mm of it and of its corners tissue slides along "
+      "its "
+      "own jaw at %d places, may lift off the other jaw's teeth, or meet a jaw behind air, at %d, "
+      "and the lips touch each other at %d.",
+      lips->vestibule_mm, counts.sliding, counts.bone, counts.lips);
+  return {{"says", Json::array({text})},
+          {"vestibule_mm", lips->vestibule_mm},
+          {"sliding_rows", counts.sliding},
+          {"bone_rows", counts.bone},
+          {"bone_rows_behind_air", counts.behind_air},
+          {"lip_rows", counts.lips},
+          {"doubled_vertices", lips->original_of_double.size()},
+          {"moved_vertices", lips->num_moved},
+          {"added_vertices", lips->num_added}};
+}
+
+std::vector<Scene> LipContactScenes(const PlanBuild& build) {
+  const FaceAxes axes(build.landmarks);
+  const Vector3d origin = axes.Place({});
+  const auto view = [&](double left, double front, double up) -> View {
+    return {.from = axes.Place({.left = left, .front = front, .up = up}) - origin,
+            .up = axes.Place({.up = 1}) - origin};
+  };
+  const std::vector<SurfaceLayer> layers = {Touching(build, kSlides, kSlidesColour),
+                                            Touching(build, kMeetsBone, kMeetsBoneColour),
+                                            Touching(build, kMeetsOtherLip, kMeetsLipColour)};
+  return {{.title = "from the front", .surfaces = layers, .view = view(0, 1, 0.2)},
+          {.title = "from the left, front", .surfaces = layers, .view = view(0.75, 0.66, 0.3)}};
+}
+
+std::vector<LegendEntry> LipContactLegend() {
+  return {{"slides on its own jaw", kSlidesColour},
+          {"may lift off the other jaw, or meet a jaw behind air", kMeetsBoneColour},
+          {"touches the other lip", kMeetsLipColour}};
 }
 
 }  // namespace tissueform

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -10,13 +11,15 @@
 
 #include "core/imaging/anatomy/landmarks.h"
 #include "core/imaging/anatomy/mouth_line.h"
+#include "core/planning/plan_building/lip_parting.h"
+#include "core/planning/plan_building/plan_builder.h"
 #include "core/planning/plan_building/skin_coverage.h"
 #include "core/planning/plan_report/plan_pictures.h"
 #include "core/planning/rendering/panels.h"
 
 namespace tissueform {
 
-// The line between the lips as the report shows it. The model does not use it yet.
+// The line between the lips and what they touch, as the report shows it.
 
 // The key "mouth_line" of report.json (docs/recipe-format.md). `mouth` may be an error, whose
 // message is reported.
@@ -27,5 +30,14 @@ nlohmann::ordered_json MouthJson(const absl::StatusOr<MouthLine>& mouth,
 std::vector<Scene> MouthScenes(const SkinCoverage& coverage, const Landmarks& landmarks,
                                const MouthLine& mouth);
 std::vector<LegendEntry> MouthLegend();
+
+// The key "lip_contact" of report.json. Null where the lips are not parted.
+nlohmann::ordered_json LipContactJson(const std::optional<PartedLips>& lips);
+
+// What of the mesh touches jaws and the other lip, by how it does.
+//
+// REQUIRES: the build's lips are parted.
+std::vector<Scene> LipContactScenes(const PlanBuild& build);
+std::vector<LegendEntry> LipContactLegend();
 
 }  // namespace tissueform

@@ -126,12 +126,21 @@ absl::StatusOr<ReportPicture> DrawMouth(const PlanBuild& build, const MouthLine&
                                         const std::string& folder) {
   const ReportPicture picture{
       "mouth.png", "Line between the lips",
-      absl::StrCat("The CT's skin about the mouth, with the line that was found on it; the model "
-                   "does not use it yet. ",
+      absl::StrCat("The CT's skin about the mouth, with the line between the lips; the model ",
+                   build.lips ? "parts along it. " : "does not use it. ",
                    absl::StrJoin(DescribeMouthLine(mouth), " ")),
       MouthLegend()};
   TF_RETURN_IF_ERROR(
       WriteScenes(picture, MouthScenes(build.coverage, build.landmarks, mouth), folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawLipContact(const PlanBuild& build, const std::string& folder) {
+  const ReportPicture picture{"lip_contact.png", "What the lips touch",
+                              "The part of the mesh's boundary that touches teeth, jaws and the "
+                              "other lip, without the rest.",
+                              LipContactLegend()};
+  TF_RETURN_IF_ERROR(WriteScenes(picture, LipContactScenes(build), folder));
   return picture;
 }
 
@@ -214,6 +223,10 @@ absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& bui
   if (mouth.ok()) {
     TF_ASSIGN_OR_RETURN(ReportPicture line, DrawMouth(build, *mouth, folder));
     pictures.push_back(std::move(line));
+  }
+  if (build.lips) {
+    TF_ASSIGN_OR_RETURN(ReportPicture contact, DrawLipContact(build, folder));
+    pictures.push_back(std::move(contact));
   }
   if (build.metal.any()) {
     TF_ASSIGN_OR_RETURN(ReportPicture metal, DrawMetal(build, folder));

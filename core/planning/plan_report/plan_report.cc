@@ -40,7 +40,8 @@ absl::Status WritePlanReport(const PlanBuild& build, const PlanReportOptions& op
                              const std::string& folder) {
   const std::filesystem::path root = folder;
   const PlanMeasures measures = MeasurePlan(build);
-  const absl::StatusOr<MouthLine> mouth = FindMouthLine(build.head, build.landmarks);
+  const absl::StatusOr<MouthLine> mouth =
+      build.lips ? build.lips->line : FindMouthLine(build.head, build.landmarks);
   std::vector<ReportPicture> pictures;
   if (options.pictures) {
     TellStage(options.tell, "drawing the pictures", 0);

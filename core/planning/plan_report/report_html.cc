@@ -194,8 +194,11 @@ std::string MetalSection(const Json& report) {
 // The sentences; the points are for programs.
 std::string MouthSection(const Json& report) {
   std::string texts;
-  for (const Json& text : report.value("mouth_line", Json::object()).value("says", Json::array())) {
-    absl::StrAppend(&texts, "<p>", EscapeHtml(text.get<std::string>()), "</p>\n");
+  for (const char* const key : {"mouth_line", "lip_contact"}) {
+    if (!report.contains(key) || !report[key].is_object()) continue;
+    for (const Json& text : report[key].value("says", Json::array())) {
+      absl::StrAppend(&texts, "<p>", EscapeHtml(text.get<std::string>()), "</p>\n");
+    }
   }
   return texts.empty() ? "" : Section("Line between the lips", texts);
 }

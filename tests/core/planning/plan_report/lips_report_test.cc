@@ -19,15 +19,15 @@ TEST(LipsReportTest, ClosedLipsAreToldWithPlaceAndSize) {
       .examined_mm = 31, .width_mm = 24, .area_mm2 = 192, .depth_mm = 8, .place_mm = {12, -60, 31}};
   EXPECT_THAT(LipsCautions(contact), ElementsAre(AllOf(HasSubstr("24"), HasSubstr("192 mm2"),
                                                        HasSubstr("(12, -60, 31) mm"))));
-  EXPECT_EQ(LipsJson(contact)["joined_mm2"], 192);
-  EXPECT_EQ(LipsJson(contact)["joined_at_mm"][2], 31);
+  EXPECT_EQ(LipsJson(contact, false)["joined_mm2"], 192);
+  EXPECT_EQ(LipsJson(contact, false)["joined_at_mm"][2], 31);
 }
 
 TEST(LipsReportTest, PartedLipsNeedNoCaution) {
   LipContact contact;
   contact.examined_mm = 31;
   EXPECT_THAT(LipsCautions(contact), IsEmpty());
-  EXPECT_FALSE(LipsJson(contact).contains("joined_at_mm"));
+  EXPECT_FALSE(LipsJson(contact, false).contains("joined_at_mm"));
 }
 
 }  // namespace
