@@ -38,6 +38,7 @@ SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& m
   request.stiffness = kStiffnessArray;
   request.fixed = problem.constraints.fixed();
   request.handles = problem.constraints.handles();
+  request.contact = problem.constraints.contact();
   request.model = problem.deformer.model;
   request.poisson_ratio = problem.deformer.preparation.poisson_ratio;
   request.gradient_field = problem.deformer.gradient_field;
@@ -82,7 +83,8 @@ std::vector<NamedPose> NamedPoses(const PlanProblem& problem) {
 
 v1::PreparedAnswers PreparedAnswersOf(const PlanProblem& problem) {
   v1::PreparedAnswers prepared;
-  if (problem.uncertainty && TraitsOf(problem.deformer.model).is_elastic) {
+  if (problem.uncertainty && TraitsOf(problem.deformer.model).is_elastic &&
+      problem.constraints.contact().empty()) {
     *prepared.mutable_ranges() = ToProto(*problem.uncertainty);
   }
   return prepared;

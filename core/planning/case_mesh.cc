@@ -13,6 +13,7 @@
 #include "core/mesh/payload/mesh_payload.h"
 #include "core/planning/case_file/case_file.h"
 #include "core/planning/case_file/case_reader.h"
+#include "core/planning/stiffness.h"
 
 namespace tissueform {
 
@@ -40,14 +41,17 @@ absl::StatusOr<TetMeshFile> ReadMeshOfCase(const std::string& path) {
 }
 
 // A server names a mesh by its vertices, its tets and the array that holds their stiffness.
-absl::Status CheckMeshDigest(const Plan& plan, const PlanProblem& problem) {
+absl::Status CheckMeshDigest(const Plan& plan, const TetMeshFile& file) {
   if (plan.mesh_sha256.empty()) return absl::OkStatus();
   std::vector<CellArray> arrays;
   if (const auto* chosen = std::get_if<StiffnessFromCellData>(&plan.stiffness)) {
-    arrays.push_back({chosen->name, problem.stiffness});
+    TF_ASSIGN_OR_RETURN(Eigen::VectorXd stiffness,
+                        ResolveStiffness(plan.stiffness, file.mesh.num_tets(), file.cell_data));
+    arrays.push_back({chosen->name, std::move(stiffness)});
   }
-  const MeshPayloadView view =
-      ViewMeshPayload(problem.mesh->positions(), problem.mesh->tets(), arrays);
+  Positions positions = file.mesh.positions();
+  SwapToOrFromLps(plan.coordinate_system, &positions);
+  const MeshPayloadView view = ViewMeshPayload(positions, file.mesh.tets(), arrays);
   if (view.Sha256() == plan.mesh_sha256) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat("mesh ", plan.mesh_path,

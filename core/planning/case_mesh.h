@@ -22,9 +22,9 @@ inline constexpr char kCaseEnding[] = ".tfcase";
 absl::StatusOr<TetMeshFile> ReadMeshOfCase(const std::string& path);
 
 // Vertex numbers mean nothing in another mesh: where the plan says a digest, the mesh has to have
-// it. `problem` is the plan upon its mesh.
+// it. `file` is in the plan's coordinate system.
 //
-// Errors: InvalidArgument.
-absl::Status CheckMeshDigest(const Plan& plan, const PlanProblem& problem);
+// Errors: InvalidArgument, also those of ResolveStiffness.
+absl::Status CheckMeshDigest(const Plan& plan, const TetMeshFile& file);
 
 }  // namespace tissueform

@@ -72,6 +72,17 @@ struct PlannedHandle {
   HandlePose pose;  // radians and mm, in the plan's coordinate system
 };
 
+// A row of contact (version 4), in the plan's coordinate system.
+struct RestingBone {};
+struct PlannedContactRow {
+  int64_t vertex = 0;
+  // What the vertex touches: bone that rests, the bone of a handle by its name, or another vertex.
+  std::variant<RestingBone, std::string, int64_t> other;
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitX();  // towards `vertex`
+  double gap_mm = 0;                                  // at rest
+  bool bilateral = false;
+};
+
 struct Plan {
   CoordinateSystem coordinate_system = CoordinateSystem::kLps;
   std::string mesh_path;    // joined with the folder of the plan
@@ -83,6 +94,7 @@ struct Plan {
   DeformationModel model = DeformationModel::kGradientField;
   GradientFieldOptions gradient_field;  // what the plan says; the rest keeps its defaults
   std::optional<PlannedUncertainty> uncertainty;
+  std::vector<PlannedContactRow> contact;  // empty: tissue sticks to bone
 };
 
 }  // namespace tissueform

@@ -17,10 +17,18 @@ namespace tissueform {
 // Largest plan file that is read.
 inline constexpr size_t kMaxPlanBytes = size_t{16} << 20;
 
+struct ResolveOptions {
+  // Whether the plan's contact rows are used. Otherwise tissue sticks to all that the selectors
+  // select, and the lips are one piece again (WeldSeam).
+  bool contact = true;
+};
+
 struct PlanReadOptions {
   // Whether the mesh may lie outside the plan's folder. A plan comes from elsewhere more often than
   // not, and what it names ends up in results that go back there.
   bool allow_outside = false;
+  // With which the plan is put upon its mesh afterwards; ReadPlan does not use them.
+  ResolveOptions resolve = {};
 };
 
 // Reads and checks a plan file against the published schema, docs/plan.schema.json, which is built
@@ -42,11 +50,13 @@ absl::StatusOr<Plan> ParsePlan(std::string_view json, const std::string& folder,
 // Errors: those of ReadTetMesh, CheckUsable and ConstraintSet::Create; InvalidArgument for a
 // missing array, a value without stiffness, stiffness <= 0, an empty selection (the message names
 // the handle or "fixed"), a mesh that is not the one of plan.mesh_sha256. A mesh that ends with
-// ".tfcase" is that of a case; then also the errors of ReadCase.
-absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan);
+// ".tfcase" is that of a case; then also the errors of ReadCase. With contact rows also those of
+// ResolveContact and WeldSeam.
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, const ResolveOptions& options = {});
 
 // The same upon a mesh that is in memory, in the plan's own coordinate system: no file is read, and
 // plan.mesh_path only stands for the mesh in messages.
-absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file);
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file,
+                                        const ResolveOptions& options = {});
 
 }  // namespace tissueform

@@ -14,6 +14,7 @@
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/plan_schema.h"
+#include "core/planning/planned_contact.h"
 
 namespace tissueform {
 namespace {
@@ -97,6 +98,7 @@ absl::StatusOr<Plan> ToPlan(const Json& json, const std::string& folder) {
   if (json.contains("uncertainty")) {
     TF_ASSIGN_OR_RETURN(plan.uncertainty, ToUncertainty(json.at("uncertainty")));
   }
+  if (json.contains("contact")) plan.contact = ContactFromJson(json.at("contact"));
   return plan;
 }
 

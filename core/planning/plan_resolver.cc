@@ -13,9 +13,11 @@
 #include "core/mesh/validation.h"
 #include "core/planning/case_mesh.h"
 #include "core/planning/plan_io.h"
+#include "core/planning/planned_contact.h"
 #include "core/planning/selector.h"
 #include "core/planning/stiffness.h"
 #include "core/planning/tissue_ranges.h"
+#include "core/planning/welded_seam.h"
 
 namespace tissueform {
 namespace {
@@ -30,7 +32,10 @@ absl::Status CheckUsable(const std::string& name, const TetMesh& mesh) {
 //
 // What hangs together with no region has no unique answer. The factorisation would find out, too,
 // but know a pivot only; here the message still knows which vertices.
-absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile& file) {
+// Vertices that touch bone by `contact` are free, and told in `freed`.
+absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile& file,
+                                             std::vector<ContactRow> contact,
+                                             std::vector<FreedVertex>* freed) {
   const SelectionSource source{file.mesh.positions(), file.point_data};
   TF_ASSIGN_OR_RETURN(std::vector<int32_t> fixed, ResolveSelector(plan.fixed, source, "fixed"));
   std::vector<HandleRegion> handles;
@@ -40,8 +45,10 @@ absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile
         ResolveSelector(handle.region, source, absl::StrCat("handle \"", handle.name, "\"")));
     handles.push_back({handle.name, std::move(vertices)});
   }
-  TF_ASSIGN_OR_RETURN(ConstraintSet constraints,
-                      ConstraintSet::Create(file.mesh, std::move(fixed), std::move(handles)));
+  TF_ASSIGN_OR_RETURN(*freed, FreeTouchingVertices(contact, &fixed, &handles));
+  TF_ASSIGN_OR_RETURN(
+      ConstraintSet constraints,
+      ConstraintSet::Create(file.mesh, std::move(fixed), std::move(handles), std::move(contact)));
   TF_RETURN_IF_ERROR(
       CheckEveryComponentConstrained(file.mesh.tets(), file.mesh.num_vertices(), constraints));
   return constraints;
@@ -67,24 +74,43 @@ absl::StatusOr<std::shared_ptr<const TetMesh>> ToLps(CoordinateSystem system, co
   return std::make_shared<const TetMesh>(std::move(in_lps));
 }
 
+// The mesh on which tissue sticks.
+absl::StatusOr<TetMeshFile> WithoutContact(const std::string& name, TetMeshFile file,
+                                           const std::vector<ContactRow>& contact) {
+  absl::StatusOr<TetMeshFile> welded = WeldSeam(std::move(file), contact);
+  absl::Status usable = welded.ok() ? CheckTetMesh(welded->mesh) : welded.status();
+  if (usable.ok()) return welded;
+  return absl::Status(usable.code(),
+                      absl::StrCat("mesh ", name, " without contact: ", usable.message()));
+}
+
 }  // namespace
 
-absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan) {
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, const ResolveOptions& options) {
   const bool is_case = absl::EndsWithIgnoreCase(plan.mesh_path, kCaseEnding);
   TF_ASSIGN_OR_RETURN(TetMeshFile file,
                       is_case ? ReadMeshOfCase(plan.mesh_path) : ReadTetMesh(plan.mesh_path));
-  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan, std::move(file)));
-  TF_RETURN_IF_ERROR(CheckMeshDigest(plan, problem));
-  return problem;
+  TF_RETURN_IF_ERROR(CheckMeshDigest(plan, file));
+  return ResolvePlan(plan, std::move(file), options);
 }
 
-absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file) {
+absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file,
+                                        const ResolveOptions& options) {
   TF_RETURN_IF_ERROR(CheckUsable(plan.mesh_path, file.mesh));
+  TF_ASSIGN_OR_RETURN(std::vector<ContactRow> contact, ResolveContact(plan));
+  ContactUse contact_use = contact.empty() ? ContactUse::kNone : ContactUse::kOn;
+  if (!options.contact && !contact.empty()) {
+    TF_ASSIGN_OR_RETURN(file, WithoutContact(plan.mesh_path, std::move(file), contact));
+    contact.clear();
+    contact_use = ContactUse::kLeftOut;
+  }
   TF_ASSIGN_OR_RETURN(Eigen::VectorXd stiffness,
                       ResolveStiffness(plan.stiffness, file.mesh.num_tets(), file.cell_data));
   TF_ASSIGN_OR_RETURN(std::optional<MaterialUncertainty> uncertainty,
                       ResolveUncertainty(plan, stiffness, file.cell_data));
-  TF_ASSIGN_OR_RETURN(ConstraintSet constraints, ResolveRegions(plan, file));
+  std::vector<FreedVertex> freed;
+  TF_ASSIGN_OR_RETURN(ConstraintSet constraints,
+                      ResolveRegions(plan, file, std::move(contact), &freed));
   TF_ASSIGN_OR_RETURN(std::vector<HandlePose> poses, ResolvePoses(plan));
   TF_ASSIGN_OR_RETURN(std::shared_ptr<const TetMesh> mesh,
                       ToLps(plan.coordinate_system, file.mesh));
@@ -100,6 +126,8 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file) {
                      .stiffness = std::move(stiffness),
                      .constraints = std::move(constraints),
                      .poses = std::move(poses),
+                     .contact_use = contact_use,
+                     .freed = std::move(freed),
                      .deformer = std::move(deformer),
                      .uncertainty = std::move(uncertainty)};
 }

@@ -3,6 +3,8 @@
 
 #include "proto/conversion/answer_conversion.h"
 
+#include "proto/conversion/contact_conversion.h"
+
 namespace tissueform {
 namespace {
 
@@ -57,6 +59,14 @@ v1::SolveSummary ToProto(const SolveSummary& summary) {
   proto.set_obstacle(summary.obstacle);
   proto.set_newton_steps(summary.newton_steps);
   proto.set_second_factor_bytes(summary.second_factor_bytes);
+  return proto;
+}
+
+v1::SolveSummary ToSummaryProto(const Deformation& deformation) {
+  v1::SolveSummary proto = ToProto(deformation.summary);
+  if (const auto contact = SummarizeContact(deformation.contact)) {
+    *proto.mutable_contact() = ToProto(*contact);
+  }
   return proto;
 }
 

@@ -14,6 +14,9 @@ namespace tissueform {
 v1::SolveSummary ToProto(const SolveSummary& summary);
 SolveSummary ToSolveSummary(const v1::SolveSummary& summary);
 
+// Also with the contact of the answer.
+v1::SolveSummary ToSummaryProto(const Deformation& deformation);
+
 v1::DeformationQuality ToProto(const DeformationQuality& quality);
 DeformationQuality ToDeformationQuality(const v1::DeformationQuality& quality);
 

@@ -18,14 +18,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "answers are little-endian");
 
-void Set(const Eigen::Vector3d& from, v1::Vector3* to) {
-  to->set_x(from.x());
-  to->set_y(from.y());
-  to->set_z(from.z());
-}
-
-Eigen::Vector3d ToVector(const v1::Vector3& vector) { return {vector.x(), vector.y(), vector.z()}; }
-
 HandlePose ToPose(const v1::HandlePose& pose) {
   return {.rotation_vector = ToVector(pose.rotation_vector()),
           .pivot_mm = ToVector(pose.pivot_mm()),
@@ -60,12 +52,22 @@ absl::Status CheckDistinctAndInRange(const std::vector<int32_t>& vertices, int64
 
 }  // namespace
 
+v1::Vector3 ToProto(const Eigen::Vector3d& vector) {
+  v1::Vector3 proto;
+  proto.set_x(vector.x());
+  proto.set_y(vector.y());
+  proto.set_z(vector.z());
+  return proto;
+}
+
+Eigen::Vector3d ToVector(const v1::Vector3& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
 v1::HandlePose ToProto(const NamedPose& pose) {
   v1::HandlePose proto;
   proto.set_handle(pose.handle);
-  Set(pose.pose.rotation_vector, proto.mutable_rotation_vector());
-  Set(pose.pose.pivot_mm, proto.mutable_pivot_mm());
-  Set(pose.pose.translation_mm, proto.mutable_translation_mm());
+  *proto.mutable_rotation_vector() = ToProto(pose.pose.rotation_vector);
+  *proto.mutable_pivot_mm() = ToProto(pose.pose.pivot_mm);
+  *proto.mutable_translation_mm() = ToProto(pose.pose.translation_mm);
   proto.set_scale(pose.pose.scale);
   return proto;
 }

@@ -26,6 +26,9 @@ struct NamedPose {
   HandlePose pose;
 };
 
+v1::Vector3 ToProto(const Eigen::Vector3d& vector);
+Eigen::Vector3d ToVector(const v1::Vector3& vector);
+
 v1::HandlePose ToProto(const NamedPose& pose);
 // The message as it is, unchecked.
 NamedPose ToNamedPose(const v1::HandlePose& pose);

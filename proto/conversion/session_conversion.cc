@@ -14,6 +14,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh/payload/sha256.h"
+#include "proto/conversion/contact_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/model_conversion.h"
 
@@ -100,6 +101,7 @@ v1::CreateSessionRequest ToProto(const SessionRequest& request) {
     handle->set_name(region.name);
     handle->mutable_vertices()->Add(region.vertices.begin(), region.vertices.end());
   }
+  *proto.mutable_contact() = ToProto(request.contact, request.handles);
   proto.set_model(ToProto(request.model));
   proto.set_poisson_ratio(request.poisson_ratio);
   *proto.mutable_gradient_field() = ToProto(request.gradient_field);
@@ -128,6 +130,7 @@ absl::StatusOr<SessionRequest> ToSessionRequest(const v1::CreateSessionRequest& 
   TF_ASSIGN_OR_RETURN(request.fixed,
                       ToVertices(proto.fixed_vertices(), limits.num_vertices, "fixed_vertices"));
   TF_RETURN_IF_ERROR(ReadHandles(proto, limits, &request));
+  TF_ASSIGN_OR_RETURN(request.contact, ToContactRows(proto.contact(), request.handles));
   return request;
 }
 

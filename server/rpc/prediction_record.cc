@@ -47,7 +47,7 @@ v1::Prediction Describe(const SingleAnswer& answer) {
   }
   prediction.set_model(ToProto(answer.model));
   SetSettings(session, &prediction);
-  *prediction.mutable_summary() = ToProto(answer.deformation.summary);
+  *prediction.mutable_summary() = ToSummaryProto(answer.deformation);
   *prediction.mutable_quality() =
       ToProto(MeasureDeformation(session.mesh().mesh, answer.deformation.positions));
   prediction.set_software_version(SoftwareVersion());
@@ -119,6 +119,7 @@ std::string RecipeSha256(const Session& session) {
   recipe.poisson_ratio = session.poisson_ratio();
   recipe.fixed = session.constraints().fixed();
   recipe.handles = session.constraints().handles();
+  recipe.contact = session.constraints().contact();
   return RequestFingerprint(ToProto(recipe));
 }
 

@@ -36,6 +36,7 @@ void SetRecipe(SessionRequest request, SessionRecord* record) {
   record->stiffness = std::move(request.stiffness);
   record->fixed = std::move(request.fixed);
   record->handles = std::move(request.handles);
+  record->contact = std::move(request.contact);
   record->model = request.model;
   record->poisson_ratio = request.poisson_ratio;
   record->gradient_field = request.gradient_field;
@@ -108,6 +109,7 @@ absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& re
   before.stiffness = record.stiffness;
   before.fixed = record.fixed;
   before.handles = record.handles;
+  before.contact = record.contact;
   before.model = record.model;
   before.poisson_ratio = record.poisson_ratio;
   before.gradient_field = record.gradient_field;
@@ -116,6 +118,7 @@ absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& re
   if (request.has_regions()) {
     *merged.mutable_fixed_vertices() = request.regions().fixed_vertices();
     *merged.mutable_handles() = request.regions().handles();
+    *merged.mutable_contact() = request.regions().contact();
   }
   if (request.model() != v1::DEFORMATION_MODEL_UNSPECIFIED) merged.set_model(request.model());
   if (request.has_gradient_field()) *merged.mutable_gradient_field() = request.gradient_field();
@@ -156,6 +159,7 @@ v1::Session ToProto(const SessionView& view) {
           ToProto(NamedPose{record.handles[h].name, record.last_poses[h]});
     }
   }
+  proto.set_contact_row_count(static_cast<int64_t>(record.contact.size()));
   proto.set_state(view.session == nullptr ? v1::SESSION_STATE_STORED : v1::SESSION_STATE_READY);
   proto.set_etag(record.etag);
   proto.mutable_create_time()->set_seconds(record.created_s);

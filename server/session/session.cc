@@ -66,9 +66,9 @@ absl::StatusOr<std::shared_ptr<Session>> Session::Create(
     std::shared_ptr<SharedPreparation> preparation, MemoryBudget* budget, WorkerPool* pool,
     const Clock* clock, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(cancellation.Check());
-  TF_ASSIGN_OR_RETURN(
-      ConstraintSet constraints,
-      ConstraintSet::Create(mesh->mesh, std::move(record.fixed), std::move(record.handles)));
+  TF_ASSIGN_OR_RETURN(ConstraintSet constraints,
+                      ConstraintSet::Create(mesh->mesh, std::move(record.fixed),
+                                            std::move(record.handles), std::move(record.contact)));
   TF_ASSIGN_OR_RETURN(const Eigen::VectorXd stiffness, ResolveStiffness(record, *mesh));
   std::shared_ptr<Session> session(new Session(record, std::move(mesh), std::move(constraints),
                                                preparation->strand(), budget, pool, clock));

@@ -207,6 +207,7 @@ std::shared_ptr<SharedPreparation> SharedPreparations::Find(const SessionRecord&
   key.stiffness = record.stiffness;
   key.fixed = record.fixed;
   key.handles = record.handles;
+  key.contact = record.contact;
   key.poisson_ratio = record.poisson_ratio;
   std::string digest = Sha256Hex({SerializeRecord(key)});
   MutexLock lock(mutex_);

@@ -134,8 +134,8 @@ class SharedPreparations {
   // Both must outlive it and all it gave out.
   SharedPreparations(MemoryBudget* budget, WorkerPool* pool) : budget_(budget), pool_(pool) {}
 
-  // That of sessions with the same owner, mesh, stiffness, regions and Poisson's ratio, or a new
-  // one. Never null.
+  // That of sessions with the same owner, mesh, stiffness, regions, contact and Poisson's ratio, or
+  // a new one. Never null.
   std::shared_ptr<SharedPreparation> Find(const SessionRecord& record);
 
  private:

@@ -12,6 +12,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/mesh/payload/sha256.h"
+#include "proto/conversion/contact_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "tissueform/store/v1/session_record.pb.h"
@@ -97,6 +98,7 @@ std::string SerializeRecord(const SessionRecord& record) {
     handle->set_name(region.name);
     handle->mutable_vertices()->Add(region.vertices.begin(), region.vertices.end());
   }
+  *proto.mutable_contact() = ToProto(record.contact, record.handles);
   proto.set_model(ToProto(record.model));
   proto.set_poisson_ratio(record.poisson_ratio);
   *proto.mutable_gradient_field() = ToProto(record.gradient_field);
@@ -124,6 +126,9 @@ absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes) {
   for (const v1::Handle& handle : proto.handles()) {
     record.handles.push_back({handle.name(), {handle.vertices().begin(), handle.vertices().end()}});
   }
+  absl::StatusOr<std::vector<ContactRow>> contact = ToContactRows(proto.contact(), record.handles);
+  if (!contact.ok()) return Damaged(contact.status().message());
+  record.contact = *std::move(contact);
   const absl::StatusOr<DeformationModel> model =
       ToModel(proto.model(), DeformationModel::kGradientField);
   if (!model.ok()) return Damaged(model.status().message());

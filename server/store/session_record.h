@@ -27,6 +27,7 @@ struct SessionRecord {
   std::variant<double, std::string> stiffness;  // Pa for every tet, or the name of a cell array
   std::vector<int32_t> fixed;
   std::vector<HandleRegion> handles;
+  std::vector<ContactRow> contact;  // empty: tissue sticks to bone
   DeformationModel model = DeformationModel::kGradientField;
   double poisson_ratio = 0.45;          // of the elastic models
   GradientFieldOptions gradient_field;  // what a client can ask for; the server fills in the rest

@@ -4,6 +4,8 @@
 #include "core/mechanics/constraints/constraint_set.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -69,6 +71,13 @@ absl::Status Mark(const std::vector<int32_t>& vertices, int region,
   return absl::OkStatus();
 }
 
+// To length 1 within rounding. What has been normalized stays to the last bit, so that rows that
+// are sent or stored give the same answer there.
+void Normalize(Eigen::Vector3d* normal) {
+  constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
+  if (std::abs(normal->squaredNorm() - 1) > kRounding) normal->normalize();
+}
+
 }  // namespace
 
 absl::StatusOr<ConstraintSet> ConstraintSet::Create(Eigen::Index num_vertices,
@@ -93,7 +102,7 @@ absl::StatusOr<ConstraintSet> ConstraintSet::Create(Eigen::Index num_vertices,
     }
   }
   TF_RETURN_IF_ERROR(CheckContactRows(contact, is_constrained, static_cast<int>(handles.size())));
-  for (ContactRow& row : contact) row.normal.normalize();
+  for (ContactRow& row : contact) Normalize(&row.normal);
   set.contact_ = std::move(contact);
   set.fixed_ = std::move(fixed);
   set.handles_ = std::move(handles);

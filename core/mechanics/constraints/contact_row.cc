@@ -3,6 +3,7 @@
 
 #include "core/mechanics/constraints/contact_row.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <map>
@@ -88,10 +89,25 @@ absl::Status CheckAgainst(size_t number, const ContactRow& row, size_t other_num
   return absl::OkStatus();
 }
 
+absl::Status CheckNumberOfRows(const std::vector<ContactRow>& rows) {
+  if (rows.size() > kMaxContactRows) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("there are ", rows.size(), " contact rows; the limit is ", kMaxContactRows));
+  }
+  const auto lifting = static_cast<size_t>(
+      std::ranges::count_if(rows, [](const ContactRow& row) { return !row.bilateral; }));
+  if (lifting <= kMaxUnilateralRows) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("there are ", lifting,
+                                                 " contact rows that are not bilateral; the limit "
+                                                 "is ",
+                                                 kMaxUnilateralRows));
+}
+
 }  // namespace
 
 absl::Status CheckContactRows(const std::vector<ContactRow>& rows,
                               const std::vector<bool>& is_constrained, int num_handles) {
+  TF_RETURN_IF_ERROR(CheckNumberOfRows(rows));
   std::map<int32_t, std::vector<size_t>> of_vertex;
   for (size_t number = 0; number < rows.size(); ++number) {
     const ContactRow& row = rows[number];

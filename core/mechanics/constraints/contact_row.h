@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -29,15 +30,21 @@ struct ContactRow {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitX();  // of length 1, towards `vertex`
   double gap_mm = 0;                                  // at rest, at least 0
   bool bilateral = false;
+
+  friend bool operator==(const ContactRow&, const ContactRow&) = default;
 };
+
+// Limits of one constraint set. Rows that may lift off are condensed to one dense matrix.
+inline constexpr size_t kMaxContactRows = 16384;
+inline constexpr size_t kMaxUnilateralRows = 4096;
 
 // InvalidArgument, naming the row by its index and saying what to do, unless in every row
 //  * the vertices lie in [0, #V), are not among `is_constrained` (#V) and differ;
 //  * the handle is kFixedBone or in [0, num_handles), and kFixedBone between two lips;
 //  * the normal has length 1 within 1e-6 and the gap is finite and not negative;
 //  * a bilateral row is of bone, without a gap;
-// and unless bilateral rows of one vertex are orthogonal within 1e-6 and no two rows are the same
-// but for their gap.
+// and unless bilateral rows of one vertex are orthogonal within 1e-6, no two rows are the same but
+// for their gap, and there are no more rows than the limits above.
 absl::Status CheckContactRows(const std::vector<ContactRow>& rows,
                               const std::vector<bool>& is_constrained, int num_handles);
 

@@ -3,6 +3,8 @@
 
 #include "core/mechanics/problem/plan_problem.h"
 
+#include <utility>
+
 namespace tissueform {
 
 Eigen::Vector3d SignsToLps(CoordinateSystem system) {
@@ -20,6 +22,18 @@ HandlePose SwapToOrFromLps(CoordinateSystem system, const HandlePose& pose) {
           .pivot_mm = signs.cwiseProduct(pose.pivot_mm),
           .translation_mm = signs.cwiseProduct(pose.translation_mm),
           .scale = pose.scale};
+}
+
+ConstraintSet StickingRegions(const PlanProblem& problem) {
+  std::vector<int32_t> fixed = problem.constraints.fixed();
+  std::vector<HandleRegion> handles = problem.constraints.handles();
+  for (const FreedVertex& freed : problem.freed) {
+    const bool of_fixed = freed.region == ConstraintSet::kFixed;
+    (of_fixed ? fixed : handles[static_cast<size_t>(freed.region)].vertices)
+        .push_back(freed.vertex);
+  }
+  // The vertices were free, each is in one region: nothing can be refused.
+  return *ConstraintSet::Create(*problem.mesh, std::move(fixed), std::move(handles));
 }
 
 }  // namespace tissueform

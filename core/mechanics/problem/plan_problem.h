@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -31,6 +32,22 @@ HandlePose SwapToOrFromLps(CoordinateSystem system, const HandlePose& pose);
 // The signs of the axes: (1, 1, 1) or (-1, -1, 1).
 Eigen::Vector3d SignsToLps(CoordinateSystem system);
 
+// A free vertex that touches bone by contact rows, and the region that it would stick to without
+// them: ConstraintSet::kFixed or the index of a handle.
+struct FreedVertex {
+  int32_t vertex = 0;
+  int region = ConstraintSet::kFixed;
+
+  friend bool operator==(const FreedVertex&, const FreedVertex&) = default;
+};
+
+// Whether the plan has contact rows, and what became of them.
+enum class ContactUse {
+  kNone,     // the plan has none
+  kOn,       // they are those of the constraints
+  kLeftOut,  // by choice: tissue sticks, and the lips are one piece
+};
+
 // A plan put upon its mesh: all that a deformer or a session needs, whether it was read from files
 // (core/planning) or has just been built (core/planning/plan_building). Everything is in LPS,
 // whatever the plan's own coordinate system was.
@@ -42,8 +59,13 @@ struct PlanProblem {
   Eigen::VectorXd stiffness;                             // #T, Pa
   ConstraintSet constraints;
   std::vector<HandlePose> poses;  // one per handle of `constraints`
+  ContactUse contact_use = ContactUse::kNone;
+  std::vector<FreedVertex> freed = {};  // by vertex, rising
   DeformerOptions deformer;
   std::optional<MaterialUncertainty> uncertainty;  // what the plan says is not known
 };
+
+// The regions to which tissue would stick without contact: what the plan's selectors select.
+ConstraintSet StickingRegions(const PlanProblem& problem);
 
 }  // namespace tissueform

@@ -74,6 +74,15 @@ struct CaseLandmark {
   std::optional<int32_t> skin_vertex = {};  // of the first surface of kind kSkin, moves with it
 };
 
+// That the session request has contact rows. A reader that does not know them would take the
+// sticking answer for the plan's.
+struct CaseContact {
+  int64_t rows = 0;  // of the session request
+  // A vertex, rising, and the region to which it sticks without contact: -1 is fixed, others are
+  // indices of handles. These vertices are in no region of the request.
+  Eigen::Matrix<int32_t, Eigen::Dynamic, 2, Eigen::RowMajor> sticking;
+};
+
 struct CaseFile {
   std::string title = {};
   // Where it is from.
@@ -83,8 +92,9 @@ struct CaseFile {
   std::string plan_sha256 = {};
 
   CaseMesh mesh;
-  std::string session_request = {};  // tissueform.v1.CreateSessionRequest, serialised
-  std::string model = {};            // by its name in plans
+  std::string session_request = {};         // tissueform.v1.CreateSessionRequest, serialised
+  std::string model = {};                   // by its name in plans
+  std::optional<CaseContact> contact = {};  // empty: tissue sticks to bone
   std::optional<std::string> material_ranges = {};  // tissueform.v1.MaterialRanges, serialised
 
   std::vector<CaseSurface> surfaces = {};

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <set>
 #include <utility>
 
@@ -87,6 +88,35 @@ void ParsePlainKeys(const Json& ours, CaseFile* contents) {
   contents->head_frame = ParseHeadFrame(ours["head_frame"]);
 }
 
+absl::StatusOr<CaseContact> ParseContact(const Glb& glb, const Json& json,
+                                         const CaseFile& contents) {
+  CaseContact contact{.rows = json["rows"].get<int64_t>(), .sticking = {}};
+  if (!json.contains("sticking")) return contact;
+  TF_ASSIGN_OR_RETURN(const absl::string_view bytes, ViewOf(glb, json, "sticking", "/contact"));
+  constexpr size_t kBytesOfPair = 2 * sizeof(int32_t);
+  if (bytes.size() % kBytesOfPair != 0) {
+    return BrokenCase("/contact/sticking",
+                      absl::StrCat("has ", bytes.size(), " bytes, which are not pairs of int32"));
+  }
+  contact.sticking.resize(static_cast<Eigen::Index>(bytes.size() / kBytesOfPair), 2);
+  std::memcpy(contact.sticking.data(), bytes.data(), bytes.size());
+  const auto num_handles = static_cast<int32_t>(contents.handles.size());
+  int32_t before = -1;
+  for (const auto& pair : contact.sticking.rowwise()) {
+    if (pair[0] <= before || pair[0] >= contents.mesh.vertex_count) {
+      return BrokenCase("/contact/sticking",
+                        absl::StrCat("has vertex ", pair[0], " after ", before, " of a mesh with ",
+                                     contents.mesh.vertex_count, "; vertices must rise"));
+    }
+    if (pair[1] < -1 || pair[1] >= num_handles) {
+      return BrokenCase("/contact/sticking",
+                        absl::StrCat("names region ", pair[1], " of ", num_handles, " handles"));
+    }
+    before = pair[0];
+  }
+  return contact;
+}
+
 absl::Status ParseBytes(const Glb& glb, const Json& ours, CaseFile* contents) {
   TF_ASSIGN_OR_RETURN(contents->mesh, ParseMesh(glb, ours["mesh"]));
   TF_ASSIGN_OR_RETURN(const absl::string_view request, ViewOf(glb, ours, "session_request", ""));
@@ -94,6 +124,9 @@ absl::Status ParseBytes(const Glb& glb, const Json& ours, CaseFile* contents) {
   if (ours.contains("material_ranges")) {
     TF_ASSIGN_OR_RETURN(const absl::string_view ranges, ViewOf(glb, ours, "material_ranges", ""));
     contents->material_ranges = std::string(ranges);
+  }
+  if (ours.contains("contact")) {
+    TF_ASSIGN_OR_RETURN(contents->contact, ParseContact(glb, ours["contact"], *contents));
   }
   TF_ASSIGN_OR_RETURN(contents->surfaces,
                       ParseSurfaces(glb, ours["surfaces"], contents->mesh.vertex_count));

@@ -35,7 +35,7 @@ Json HandleToJson(const CaseHandle& handle) {
 // Without what needs bytes in the file.
 Json PlainKeys(const CaseFile& contents) {
   Json json = {{"format", "tissueform-case"},
-               {"version", 1},
+               {"version", contents.contact ? 2 : 1},
                {"title", contents.title},
                {"notice", "not a medical device"},
                {"provenance",
@@ -68,6 +68,13 @@ absl::StatusOr<std::string> SerializeCase(const CaseFile& contents) {
   ours["session_request"] = writer.AddBytes(contents.session_request);
   if (contents.material_ranges) {
     ours["material_ranges"] = writer.AddBytes(*contents.material_ranges);
+  }
+  if (contents.contact) {
+    const auto& sticking = contents.contact->sticking;
+    const absl::string_view bytes(reinterpret_cast<const char*>(sticking.data()),
+                                  static_cast<size_t>(sticking.size()) * sizeof(int32_t));
+    ours["contact"] = {{"rows", contents.contact->rows}};
+    if (!bytes.empty()) ours["contact"]["sticking"] = writer.AddBytes(bytes);
   }
   ours["mesh"] = {{"name", contents.mesh.name},
                   {"vertex_count", contents.mesh.vertex_count},

@@ -62,8 +62,8 @@ TEST(BadPlanTest, WrongTypeIsNamedWithTheRightOne) {
 }
 
 TEST(BadPlanTest, FixedWordsOfTheFormatAreDemanded) {
-  EXPECT_THAT(Parse(PlanWith("/version", 4)),
-              IsRefused("wrong value at /version: 4 must be 1 to 3"));
+  EXPECT_THAT(Parse(PlanWith("/version", 5)),
+              IsRefused("wrong value at /version: 5 must be 1 to 4"));
   EXPECT_THAT(Parse(PlanWith("/format", "plan")), IsRefused("wrong value at /format"));
   EXPECT_THAT(Parse(PlanWith("/unit", "cm")),
               IsRefused("wrong value at /unit: \"cm\" must be \"mm\""));

@@ -75,6 +75,20 @@ TEST(SessionRecordTest, ARecordSurvivesItsBytes) {
   EXPECT_EQ(SerializeRecord(back), SerializeRecord(record)) << "nothing else is in the bytes";
 }
 
+TEST(SessionRecordTest, ContactRowsComeAfterAllThatRecordsWithoutThemHold) {
+  SessionRecord record = SomeRecord();
+  const std::string without = SerializeRecord(record);
+  EXPECT_TRUE(ParseRecord(without)->contact.empty());
+  record.contact = {{.vertex = 7, .handle = 1, .normal = {0.6, 0, 0.8}, .gap_mm = 0.25},
+                    {.vertex = 8, .bilateral = true},
+                    {.vertex = 10, .other = 0}};
+  const std::string with = SerializeRecord(record);
+  EXPECT_TRUE(with.starts_with(without)) << "older records are as before";
+  ASSERT_OK_AND_ASSIGN(const SessionRecord back, ParseRecord(with));
+  EXPECT_EQ(back.contact, record.contact);
+  EXPECT_EQ(SerializeRecord(back), with);
+}
+
 TEST(SessionRecordTest, AUniformStiffnessAndAPoissonRatioOfZeroSurvive) {
   SessionRecord record = SomeRecord();
   record.stiffness = 0.0;

@@ -40,6 +40,24 @@ TEST(ContactRowTest, RowsAreKeptInTheirOrderWithNormalsOfLengthOne) {
   EXPECT_THAT(With({})->contact(), ::testing::IsEmpty());
 }
 
+TEST(ContactRowTest, ThereAreLimits) {
+  const auto rows = [](size_t number, bool bilateral) {
+    std::vector<ContactRow> all(number);
+    for (size_t i = 0; i < number; ++i) {
+      all[i].vertex = static_cast<int32_t>(i);
+      all[i].bilateral = bilateral;
+    }
+    return all;
+  };
+  const std::vector<bool> is_free(kMaxContactRows + 1, false);
+  EXPECT_THAT(CheckContactRows(rows(kMaxContactRows, true), is_free, 1), IsOk());
+  EXPECT_THAT(CheckContactRows(rows(kMaxContactRows + 1, true), is_free, 1),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the limit is 16384")));
+  EXPECT_THAT(CheckContactRows(rows(kMaxUnilateralRows, false), is_free, 1), IsOk());
+  EXPECT_THAT(CheckContactRows(rows(kMaxUnilateralRows + 1, false), is_free, 1),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the limit is 4096")));
+}
+
 TEST(ContactRowTest, WhatIsWrongIsNamedWithItsRow) {
   const ContactRow good = {.vertex = 1};
   const struct {

@@ -84,8 +84,11 @@ INSTANTIATE_TEST_SUITE_P(
     Lies, BadJsonTest,
     ::testing::Values(
         BadJson{"NoExtension", [](Json* j) { j->erase("extensions"); }, "not a case"},
-        BadJson{"NewerVersion", [](Json* j) { Ours(j)["version"] = 2; }, "newer program"},
+        BadJson{"NewerVersion", [](Json* j) { Ours(j)["version"] = 3; }, "newer program"},
         BadJson{"UnknownKey", [](Json* j) { Ours(j)["colour"] = "red"; }, "colour"},
+        BadJson{"ContactInVersionOne", [](Json* j) { Ours(j)["contact"] = {{"rows", 3}}; }, "\"contact\" at / came with version 2"},
+        BadJson{"ContactWithoutRows", [](Json* j) { Ours(j)["version"] = 2; Ours(j)["contact"] = {{"rows", 0}}; }, "/contact/rows"},
+        BadJson{"HalfAPair", [](Json* j) { Ours(j)["version"] = 2; Ours(j)["contact"] = {{"rows", 3}, {"sticking", Ours(j)["surfaces"][0]["regions"]}}; }, "/contact/sticking"},
         BadJson{"NoNotice", [](Json* j) { Ours(j).erase("notice"); }, "notice"},
         BadJson{"ViewThatIsNot", [](Json* j) { Ours(j)["session_request"] = 1000; }, "/session_request"},
         BadJson{"NegativeView", [](Json* j) { Ours(j)["session_request"] = -1; }, "/session_request"},

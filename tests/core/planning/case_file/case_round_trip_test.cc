@@ -69,6 +69,44 @@ TEST(CaseRoundTripTest, WithoutRangesThereAreNone) {
   EXPECT_FALSE(read.material_ranges.has_value());
 }
 
+TEST(CaseRoundTripTest, ContactComesBackAndMakesVersionTwo) {
+  CaseFile contents = SampleCase();
+  ASSERT_OK_AND_ASSIGN(const std::string before, SerializeCase(contents));
+  EXPECT_THAT(before, ::testing::HasSubstr("\"version\":1"));
+  EXPECT_FALSE(ParseCase(before)->contact.has_value());
+  contents.contact.emplace().rows = 7;
+  for (const bool sticks : {false, true}) {
+    if (sticks) {
+      contents.contact->sticking.resize(3, 2);
+      contents.contact->sticking << 2, -1, 5, 0, 6, -1;
+    }
+    ASSERT_OK_AND_ASSIGN(const std::string bytes, SerializeCase(contents));
+    EXPECT_THAT(bytes, ::testing::HasSubstr("\"version\":2"));
+    ASSERT_OK_AND_ASSIGN(const CaseFile read, ParseCase(bytes));
+    ASSERT_TRUE(read.contact.has_value());
+    EXPECT_EQ(read.contact->rows, 7);
+    EXPECT_EQ(read.contact->sticking, contents.contact->sticking);
+    EXPECT_EQ(read.session_request, contents.session_request);
+  }
+}
+
+TEST(CaseRoundTripTest, ContactThatDoesNotFitTheMeshIsRefused) {
+  const auto refused = [](int32_t vertex, int32_t next, int32_t region) {
+    CaseFile contents = SampleCase();
+    contents.contact.emplace().rows = 2;
+    contents.contact->sticking.resize(2, 2);
+    contents.contact->sticking << vertex, -1, next, region;
+    EXPECT_THAT(SerializeCase(contents),
+                testing::StatusIs(absl::StatusCode::kInvalidArgument,
+                                  ::testing::HasSubstr("/contact/sticking")));
+  };
+  refused(-1, 3, 0);
+  refused(3, 3, 0);
+  refused(3, static_cast<int32_t>(SampleCase().mesh.vertex_count), 0);
+  refused(3, 4, 1);
+  refused(3, 4, -2);
+}
+
 // A viewer reads the beginning of the file and fetches the mesh only when a server asks for it.
 TEST(CaseRoundTripTest, TheMeshComesLastAndPiecesLieAtMultiplesOf16) {
   ASSERT_OK_AND_ASSIGN(const std::string bytes, SerializeCase(SampleCase()));

@@ -1,0 +1,91 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include "core/planning/welded_seam.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/base/status_macros.h"
+
+namespace tissueform {
+namespace {
+
+// For every vertex the first one at its place that rows join it with: itself unless it is a double.
+absl::StatusOr<std::vector<int32_t>> FirstAtPlace(const Positions& positions,
+                                                  const std::vector<ContactRow>& rows) {
+  std::vector<int32_t> first(static_cast<size_t>(positions.rows()));
+  std::iota(first.begin(), first.end(), 0);
+  for (size_t number = 0; number < rows.size(); ++number) {
+    const ContactRow& row = rows[number];
+    if (row.other == ContactRow::kBone) continue;
+    const auto [earlier, later] = std::minmax(row.vertex, row.other);
+    if (earlier < 0 || later >= positions.rows()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("contact row ", number, " names vertex ", earlier < 0 ? earlier : later,
+                       ", but the mesh has vertices 0 to ", positions.rows() - 1));
+    }
+    if (positions.row(earlier) != positions.row(later)) continue;
+    int32_t& known = first[static_cast<size_t>(later)];
+    known = std::min(known, earlier);
+  }
+  // An earlier vertex is settled before those that are joined with it.
+  for (int32_t& vertex : first) vertex = first[static_cast<size_t>(vertex)];
+  return first;
+}
+
+// The number of vertices without the doubles.
+absl::StatusOr<int32_t> NumKept(const std::vector<int32_t>& first) {
+  const auto num_vertices = static_cast<int32_t>(first.size());
+  int32_t kept = num_vertices;
+  while (kept > 0 && first[static_cast<size_t>(kept) - 1] != kept - 1) --kept;
+  for (int32_t vertex = 0; vertex < kept; ++vertex) {
+    if (first[static_cast<size_t>(vertex)] == vertex) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the lips cannot be joined: vertex ", vertex, " doubles vertex ",
+        first[static_cast<size_t>(vertex)], " and is not among the last vertices (vertex ", kept - 1,
+        " is not a double); number the seam's doubles last, or keep contact on"));
+  }
+  return kept;
+}
+
+absl::StatusOr<TetIndices> WeldTets(const TetIndices& tets, const std::vector<int32_t>& first) {
+  TetIndices welded = tets;
+  for (Eigen::Index t = 0; t < welded.rows(); ++t) {
+    for (int corner = 0; corner < 4; ++corner) {
+      welded(t, corner) = first[static_cast<size_t>(tets(t, corner))];
+      for (int before = 0; before < corner; ++before) {
+        if (welded(t, before) != welded(t, corner)) continue;
+        return absl::InvalidArgumentError(absl::StrCat(
+            "the lips cannot be joined: tet ", t, " has vertices ", tets(t, before), " and ",
+            tets(t, corner), ", which are at one place; keep contact on"));
+      }
+    }
+  }
+  return welded;
+}
+
+}  // namespace
+
+absl::StatusOr<TetMeshFile> WeldSeam(TetMeshFile file, const std::vector<ContactRow>& rows) {
+  TF_ASSIGN_OR_RETURN(const std::vector<int32_t> first, FirstAtPlace(file.mesh.positions(), rows));
+  TF_ASSIGN_OR_RETURN(const int32_t kept, NumKept(first));
+  if (kept == file.mesh.num_vertices()) return file;
+  TF_ASSIGN_OR_RETURN(TetIndices tets, WeldTets(file.mesh.tets(), first));
+  TF_ASSIGN_OR_RETURN(
+      file.mesh, TetMesh::Create(Positions(file.mesh.positions().topRows(kept)), std::move(tets)));
+  for (Attribute& array : file.point_data) {
+    const size_t size = static_cast<size_t>(kept) * static_cast<size_t>(array.components);
+    std::visit([size](auto& values) { values.resize(size); }, array.values);
+  }
+  return file;
+}
+
+}  // namespace tissueform

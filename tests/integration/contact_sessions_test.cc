@@ -1,0 +1,243 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "client/cpp/plan_session.h"
+#include "core/mechanics/deformation/create_deformer.h"
+#include "core/mechanics/problem/contact_summary.h"
+#include "proto/conversion/contact_conversion.h"
+#include "proto/conversion/session_conversion.h"
+#include "tests/integration/durable_server.h"
+#include "tests/integration/service_test.h"
+#include "tests/testing/parted_block.h"
+#include "tests/testing/status_matchers.h"
+
+// Sessions whose tissue slides and lifts off, over the network and through a restart.
+namespace tissueform::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr char kArray[] = "youngs_modulus_pa";
+
+class ContactSessionsTest : public ServiceTest {
+ protected:
+  // Down, so that the lips press; up, so that they part; and both with a turn.
+  static std::vector<HandlePose> Poses() {
+    std::vector<HandlePose> poses(6);
+    for (size_t i = 0; i < poses.size(); ++i) {
+      poses[i].translation_mm = {0.05, -0.1, (i % 2 == 0 ? -0.1 : 0.1) * static_cast<double>(i + 1)};
+      poses[i].rotation_vector.x() = 0.02 * static_cast<double>(i % 3);
+    }
+    return poses;
+  }
+
+  PlanProblem Problem(const std::vector<ContactRow>& rows) const {
+    PlanProblem problem{
+        .mesh = std::make_shared<const TetMesh>(block_.mesh),
+        .point_data = {},
+        .cell_data = {},
+        .written_in = CoordinateSystem::kLps,
+        .stiffness = Eigen::VectorXd::Constant(block_.mesh.num_tets(), 9000),
+        .constraints = *ConstraintSet::Create(block_.mesh, block_.Constraints().fixed(),
+                                              {{"top", PartedBlock::Top()}}, rows),
+        .poses = {HandlePose{}},
+        .deformer = {},
+        .uncertainty = {}};
+    problem.deformer.model = DeformationModel::kLinearElastic;
+    return problem;
+  }
+
+  static Deformation Solve(const PlanProblem& problem, const HandlePose& pose) {
+    const auto deformer =
+        CreateDeformer(*problem.mesh, problem.stiffness, problem.constraints, problem.deformer);
+    EXPECT_THAT(deformer, IsOk());
+    return *(*deformer)->Deform({pose});
+  }
+
+  static std::string Float32Bytes(const Positions& positions) {
+    const FloatPositions rounded = positions.cast<float>();
+    return {reinterpret_cast<const char*>(rounded.data()),
+            static_cast<size_t>(rounded.size()) * sizeof(float)};
+  }
+
+  static v1::Session MakeContactSession(TissueformClient* client, const PlanProblem& problem,
+                                        const std::string& id = "") {
+    const auto mesh = client->UploadMesh(*problem.mesh, {{kArray, problem.stiffness}});
+    EXPECT_THAT(mesh, IsOk());
+    SessionRequest request = SessionRequestOf(problem, mesh->name());
+    request.session_id = id;
+    const auto session = client->CreateSession(request);
+    EXPECT_THAT(session, IsOk());
+    return *session;
+  }
+
+  static std::string Answer(TissueformClient* client, const v1::Session& session,
+                            const HandlePose& pose) {
+    const auto answer = client->DeformOnce(session.name(), TopPose(pose));
+    EXPECT_THAT(answer, IsOk());
+    return answer->positions();
+  }
+
+  // The frames of a drag through all poses.
+  static std::vector<std::string> Drag(TissueformClient* client, const v1::Session& session,
+                                       const DeformStream::Options& options = {}) {
+    std::vector<std::string> frames;
+    const auto stream = client->OpenStream(session.name(), options);
+    EXPECT_THAT(stream, IsOk());
+    for (const HandlePose& pose : Poses()) {
+      EXPECT_THAT((*stream)->SendPoses(frames.size() + 1, TopPose(pose)), IsOk());
+      std::optional<v1::DeformFrame> frame = (*stream)->Receive();
+      EXPECT_TRUE(frame.has_value());
+      EXPECT_THAT((*stream)->Ack(*frame), IsOk());
+      frames.push_back(frame->positions());
+    }
+    return frames;
+  }
+
+  const PartedBlock block_;
+};
+
+TEST_F(ContactSessionsTest, AnswersAreThoseOfThisProcessToTheLastBit) {
+  const auto client = Connect();
+  const PlanProblem problem = Problem(block_.rows);
+  const v1::Session session = MakeContactSession(client.get(), problem);
+  EXPECT_EQ(session.contact_row_count(), static_cast<int64_t>(block_.rows.size()));
+  int64_t pressing = 0;
+  for (const HandlePose& pose : Poses()) {
+    const Deformation expected = Solve(problem, pose);
+    ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
+                         client->DeformOnce(session.name(), TopPose(pose)));
+    EXPECT_EQ(answer.positions(), Float32Bytes(expected.positions));
+    ASSERT_TRUE(answer.summary().has_contact());
+    EXPECT_EQ(ToContactSummary(answer.summary().contact()), SummarizeContact(expected.contact));
+    pressing += answer.summary().contact().pressing_row_count();
+  }
+  EXPECT_GT(pressing, 0);
+}
+
+TEST_F(ContactSessionsTest, ADragShowsTheSingleAnswers) {
+  const auto client = Connect();
+  const PlanProblem problem = Problem(block_.rows);
+  const v1::Session session = MakeContactSession(client.get(), problem);
+  const std::vector<std::string> frames = Drag(client.get(), session);
+  DeformStream::Options prepared;
+  prepared.prepared.emplace();
+  const std::vector<std::string> quick = Drag(client.get(), session, prepared);
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const Positions single = Solve(problem, Poses()[i]).positions;
+    ASSERT_OK_AND_ASSIGN(const Positions direct, DecodePositions(frames[i], single.rows()));
+    EXPECT_LT((direct - single).cwiseAbs().maxCoeff(), 1e-6) << "mm, at pose " << i;
+    ASSERT_OK_AND_ASSIGN(const Positions answered, DecodePositions(quick[i], single.rows()));
+    EXPECT_LT((answered - single).rowwise().norm().maxCoeff(), 0.01) << i;
+  }
+}
+
+TEST_F(ContactSessionsTest, AClientEvaluatesPreparedAnswersWithContact) {
+  const auto client = Connect();
+  const PlanProblem problem = Problem(block_.rows);
+  const v1::Session session = MakeContactSession(client.get(), problem);
+  DeformStream::Options options;
+  options.prepared.emplace();
+  ASSERT_OK_AND_ASSIGN(const auto evaluator, client->FetchPreparedAnswers(session, options));
+  for (const HandlePose& pose : Poses()) {
+    ASSERT_OK_AND_ASSIGN(const auto near, evaluator->Evaluate(TopPose(pose)));
+    ASSERT_TRUE(near.has_value());
+    const Positions expected = Solve(problem, pose).positions;
+    const Eigen::Map<const FloatPositions> given(near->positions.data(), expected.rows(), 3);
+    EXPECT_LE((given.cast<double>() - expected).rowwise().norm().maxCoeff(), 0.01);
+  }
+}
+
+TEST_F(ContactSessionsTest, NewRegionsReplaceTheRows) {
+  const auto client = Connect();
+  const PlanProblem touching = Problem(block_.rows);
+  const PlanProblem sticking = Problem({});
+  const HandlePose pose = Poses()[2];
+  const std::string with = Float32Bytes(Solve(touching, pose).positions);
+  const std::string without = Float32Bytes(Solve(sticking, pose).positions);
+  ASSERT_NE(with, without);
+  const v1::Session session = MakeContactSession(client.get(), touching);
+  v1::UpdateSessionRequest update;
+  update.set_name(session.name());
+  for (const PlanProblem* problem : {&sticking, &touching}) {
+    const v1::CreateSessionRequest whole = ToProto(SessionRequestOf(*problem, ""));
+    v1::SessionRegions* regions = update.mutable_regions();
+    *regions->mutable_fixed_vertices() = whole.fixed_vertices();
+    *regions->mutable_handles() = whole.handles();
+    *regions->mutable_contact() = whole.contact();
+    ASSERT_OK_AND_ASSIGN(const v1::Session after, client->UpdateSession(update));
+    EXPECT_EQ(after.contact_row_count(), whole.contact_size());
+    EXPECT_EQ(Answer(client.get(), session, pose), problem == &touching ? with : without);
+  }
+  // Another change keeps them.
+  v1::UpdateSessionRequest stiffness;
+  stiffness.set_name(session.name());
+  stiffness.mutable_stiffness()->set_uniform_pa(9000);
+  ASSERT_OK_AND_ASSIGN(const v1::Session after, client->UpdateSession(stiffness));
+  EXPECT_EQ(after.contact_row_count(), session.contact_row_count());
+}
+
+TEST_F(ContactSessionsTest, SessionsWithAndWithoutRowsShareNothing) {
+  const auto client = Connect();
+  const PlanProblem touching = Problem(block_.rows);
+  const PlanProblem sticking = Problem({});
+  const v1::Session one = MakeContactSession(client.get(), touching);
+  const v1::Session other = MakeContactSession(client.get(), sticking);
+  EXPECT_EQ(other.contact_row_count(), 0);
+  const HandlePose pose = Poses()[4];
+  EXPECT_EQ(Answer(client.get(), one, pose), Float32Bytes(Solve(touching, pose).positions));
+  EXPECT_EQ(Answer(client.get(), other, pose), Float32Bytes(Solve(sticking, pose).positions));
+}
+
+TEST_F(ContactSessionsTest, BadRowsAreRefusedByTheirIndex) {
+  const auto client = Connect();
+  const PlanProblem problem = Problem(block_.rows);
+  ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh,
+                       client->UploadMesh(*problem.mesh, {{kArray, problem.stiffness}}));
+  const auto refused = [&](auto change, const std::string& why) {
+    SessionRequest request = SessionRequestOf(problem, mesh.name());
+    change(request.contact[1]);
+    EXPECT_THAT(client->CreateSession(request),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("contact row 1 " + why)));
+  };
+  refused([](ContactRow& row) { row.vertex = 0; }, "names vertex 0, which moves with a region");
+  refused([](ContactRow& row) { row.vertex = 1 << 20; }, "names vertex");
+  refused([](ContactRow& row) { row.normal *= 2; }, "has a normal of length 2");
+  refused([](ContactRow& row) { row.normal.x() = std::nan(""); }, "has a normal of length nan");
+  refused([](ContactRow& row) { row.bilateral = false, row.gap_mm = -1; }, "has a gap of -1");
+  refused([](ContactRow& row) { row.bilateral = false, row.gap_mm = std::nan(""); },
+          "has a gap of nan");
+  EXPECT_TRUE(client->CreateSession(SessionRequestOf(problem, mesh.name())).ok());
+}
+
+TEST_F(ContactSessionsTest, ARestoredSessionShowsTheSameFrames) {
+  DurableServer durable("contact", {"--log-level", "warn"});
+  ASSERT_THAT(durable.Start(), IsOk());
+  const PlanProblem problem = Problem(block_.rows);
+  v1::Session session;
+  std::vector<std::string> before;
+  {
+    ASSERT_OK_AND_ASSIGN(const auto client, durable.Connect());
+    session = MakeContactSession(client.get(), problem, "a-session-in-mid-contact");
+    before = Drag(client.get(), session);
+  }
+  ASSERT_THAT(durable.Kill(), IsOk());
+  ASSERT_THAT(durable.Start(), IsOk());
+  ASSERT_OK_AND_ASSIGN(const auto client, durable.Connect());
+  ASSERT_OK_AND_ASSIGN(const v1::Session stored, client->GetSession(session.name()));
+  EXPECT_EQ(stored.etag(), session.etag());
+  EXPECT_EQ(stored.contact_row_count(), session.contact_row_count());
+  EXPECT_EQ(Drag(client.get(), session), before);
+}
+
+}  // namespace
+}  // namespace tissueform::testing
