@@ -34,14 +34,12 @@ absl::StatusOr<ContactReconstruction::Answer> ContactReconstruction::Solve(
   const LcpSolution& solution =
       solver_.Solve({condensed.data(), static_cast<size_t>(condensed.size())});
   answer.converged = solution.converged;
-  answer.forces =
-      Eigen::Map<const Eigen::VectorXd>(solution.multipliers.data(), condensed.size());
+  answer.forces = Eigen::Map<const Eigen::VectorXd>(solution.multipliers.data(), condensed.size());
   const Eigen::VectorXd multipliers = contact_.Multipliers(gaps, answer.forces);
   Eigen::MatrixXd loads = Eigen::MatrixXd::Zero(answer.displacements.rows(), 3);
   contact_.AddLoads(multipliers, &loads);
-  TF_ASSIGN_OR_RETURN(
-      const Eigen::MatrixXd pushed,
-      system_.Solve(loads, Eigen::MatrixXd::Zero(targets.displacements.rows(), 3)));
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd pushed,
+                      system_.Solve(loads, Eigen::MatrixXd::Zero(targets.displacements.rows(), 3)));
   answer.displacements += pushed;
   if (rhs->rows() == 0) {
     *rhs = std::move(loads);

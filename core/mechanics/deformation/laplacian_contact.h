@@ -74,9 +74,9 @@ class LaplacianContact {
   absl::Status Eliminate(const Eigen::MatrixXd& of_rows);
 
   const std::vector<ContactRow> rows_;
-  std::vector<int32_t> vertices_;    // with rows, rising
-  std::vector<int32_t> bilateral_;   // rows, rising
-  std::vector<int32_t> unilateral_;  // rows, rising
+  std::vector<int32_t> vertices_;            // with rows, rising
+  std::vector<int32_t> bilateral_;           // rows, rising
+  std::vector<int32_t> unilateral_;          // rows, rising
   Eigen::LLT<Eigen::MatrixXd> held_factor_;  // of C_ee
   Eigen::MatrixXd held_to_free_;             // C_ee^-1 C_eu
   Eigen::MatrixXd compliance_;

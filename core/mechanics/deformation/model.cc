@@ -34,7 +34,7 @@ constexpr std::array<ModelTraits, 4> kModels = {{
      .iterates = true,
      .is_elastic = true,
      .has_prepared_answers = true,
-     .has_contact = false},
+     .has_contact = true},
 }};
 
 constexpr bool RowsStandAtTheirModels() {

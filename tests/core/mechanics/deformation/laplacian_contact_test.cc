@@ -14,8 +14,8 @@
 
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mesh/operators/laplacian.h"
+#include "tests/core/mechanics/deformation/sliding_block.h"
 #include "tests/testing/elastic_bar.h"
-#include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
@@ -24,83 +24,12 @@ namespace {
 using ::testing::Each;
 using ::testing::Ge;
 using ::testing::HasSubstr;
-using ::tissueform::testing::Bar;
+using ::tissueform::testing::GapsOf;
 using ::tissueform::testing::IsOk;
 using ::tissueform::testing::Pose;
-using ::tissueform::testing::SelectVertices;
+using ::tissueform::testing::RandomPose;
+using ::tissueform::testing::SlidingBlock;
 using ::tissueform::testing::StatusIs;
-
-constexpr int kBone = 0;  // the first handle
-
-// A block of 3 x 3 x 4 mm on z = 0, held there. A bone lies on its top, of which one corner sticks
-// to it; a part of the rest slides and a part may lift off. Another part touches the block's side
-// with itself, in pairs.
-class SlidingBlock {
- public:
-  explicit SlidingBlock(bool only_bilateral = false) : mesh_(Bar({3, 3, 4}, 1.0, 0.15)) {
-    std::mt19937 generator(4);
-    std::uniform_real_distribution<double> number(-0.3, 0.3);
-    fixed_ = SelectVertices(mesh_, [](const auto& x) { return x.z() < 0.5; });
-    held_ = SelectVertices(mesh_, [](const auto& x) { return x.z() > 3.5 && x.x() > 2.5; });
-    for (const int32_t v :
-         SelectVertices(mesh_, [](const auto& x) { return x.z() > 3.5 && x.x() < 2.5; })) {
-      const bool bilateral = mesh_.positions()(v, 0) > 0.5;
-      rows_.push_back({.vertex = v,
-                       .handle = kBone,
-                       .normal = Eigen::Vector3d(number(generator), number(generator), -1)
-                                     .normalized(),
-                       .gap_mm = bilateral ? 0.0 : 0.02 * v / 80,
-                       .bilateral = bilateral});
-    }
-    const auto side = SelectVertices(mesh_, [](const auto& x) {
-      return x.y() < 0.5 && x.x() > 0.5 && x.z() > 0.5 && x.z() < 3.5;
-    });
-    for (size_t i = 0; i + 1 < side.size(); i += 2) {
-      rows_.push_back({.vertex = side[i],
-                       .other = side[i + 1],
-                       .normal = (mesh_.positions().row(side[i]) -
-                                  mesh_.positions().row(side[i + 1]))
-                                     .normalized()});
-    }
-    if (only_bilateral) std::erase_if(rows_, [](const auto& row) { return !row.bilateral; });
-  }
-
-  std::shared_ptr<MeshPreparation> Prepare() const {
-    const Eigen::VectorXd stiffness =
-        Eigen::VectorXd::LinSpaced(mesh_.num_tets(), 5000, 20000);
-    return *MeshPreparation::Create(
-        mesh_, stiffness, *ConstraintSet::Create(mesh_, fixed_, {{"bone", held_}}, rows_), {});
-  }
-
-  const TetMesh mesh_;
-  std::vector<int32_t> fixed_;
-  std::vector<int32_t> held_;
-  std::vector<ContactRow> rows_;
-};
-
-HandlePose RandomPose(std::mt19937* generator) {
-  std::uniform_real_distribution<double> number(-0.4, 0.4);
-  HandlePose pose;
-  pose.pivot_mm = {2, 1, 4};
-  pose.translation_mm = {number(*generator), number(*generator), number(*generator)};
-  pose.rotation_vector = {number(*generator), number(*generator), number(*generator)};
-  return pose;
-}
-
-// Gaps of displacements by the definition of ContactRow.
-Eigen::VectorXd GapsOf(const MeshPreparation& preparation, const Positions& moved,
-                       const HandlePose& pose) {
-  const std::vector<ContactRow>& rows = preparation.constraints().contact();
-  Eigen::VectorXd gaps(static_cast<Eigen::Index>(rows.size()));
-  for (size_t r = 0; r < rows.size(); ++r) {
-    const Eigen::Vector3d place = preparation.mesh().positions().row(rows[r].vertex);
-    Eigen::Vector3d other = ApplyPose(pose, place) - place;
-    if (rows[r].other != ContactRow::kBone) other = moved.row(rows[r].other);
-    gaps[static_cast<Eigen::Index>(r)] =
-        rows[r].normal.dot(moved.row(rows[r].vertex).transpose() - other) + rows[r].gap_mm;
-  }
-  return gaps;
-}
 
 // The answer by one dense system of all coordinates and all closed rows: the rows that may lift off
 // are taken from the answer under test, whose gaps and forces then have to have the right signs.
@@ -231,8 +160,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Setting{"Uniform",
                               GradientField(RotationMode::kPropagated, Guidance::kUniform)},
                       Setting{"Estimated", GradientField(RotationMode::kEstimated)},
-                      Setting{"None", GradientField(RotationMode::kNone)},
-                      Setting{"Arap", Arap()}),
+                      Setting{"None", GradientField(RotationMode::kNone)}, Setting{"Arap", Arap()}),
     [](const auto& setting) { return setting.param.name; });
 
 TEST_P(ModelOnLaplacianTest, RowsHoldInEveryPose) {
@@ -283,23 +211,9 @@ TEST_P(ModelOnLaplacianTest, AnswersDoNotDependOnTheDragBefore) {
 
 // Rows in three directions are what a region is.
 TEST_P(ModelOnLaplacianTest, SlidingInNoDirectionIsSticking) {
-  SlidingBlock block(/*only_bilateral=*/true);
-  std::vector<ContactRow> rows;
-  std::vector<int32_t> stuck = block.held_;
-  for (const ContactRow& row : block.rows_) {
-    const Eigen::Vector3d second = row.normal.unitOrthogonal();
-    for (const Eigen::Vector3d& normal :
-         {row.normal, second, Eigen::Vector3d(row.normal.cross(second))}) {
-      rows.push_back(
-          {.vertex = row.vertex, .handle = kBone, .normal = normal, .bilateral = true});
-    }
-    stuck.push_back(row.vertex);
-  }
-  block.rows_ = rows;
-  const auto sliding = block.Prepare();
-  block.rows_ = {};
-  block.held_ = stuck;
-  const auto sticking = block.Prepare();
+  const SlidingBlock block(/*only_bilateral=*/true);
+  const auto sliding = block.WithRowsInAllDirections().Prepare();
+  const auto sticking = block.Sticking().Prepare();
   const HandlePose pose = Pose({0.2, -0.1, 0.3}, {0.3, -0.2, 0.2});
   const Deformation found = *(*CreateDeformer(sliding, GetParam().options))->Deform({pose});
   const Deformation expected = *(*CreateDeformer(sticking, GetParam().options))->Deform({pose});
@@ -312,8 +226,8 @@ TEST_P(ModelOnLaplacianTest, AMovementOfEverythingIsThatMovement) {
   block.held_.insert(block.held_.end(), block.fixed_.begin(), block.fixed_.end());
   block.fixed_ = {};
   for (ContactRow& row : block.rows_) row.gap_mm = 0;
-  const Deformation answer =
-      *(*CreateDeformer(block.Prepare(), GetParam().options))->Deform({Pose({0, 0, 0}, {3, -2, 5})});
+  const Deformation answer = *(*CreateDeformer(block.Prepare(), GetParam().options))
+                                  ->Deform({Pose({0, 0, 0}, {3, -2, 5})});
   const Positions moved = answer.positions - block.mesh_.positions();
   EXPECT_LT((moved.rowwise() - Eigen::RowVector3d(3, -2, 5)).cwiseAbs().maxCoeff(), 1e-9);
 }
