@@ -209,9 +209,8 @@ absl::StatusOr<Positions> TurningContact::Correction(const Positions& displaceme
   }
   if (!closed_.empty()) {
     const Eigen::VectorXd gaps = Gaps(displacements + correction)(closed_);
-    TF_ASSIGN_OR_RETURN(
-        Eigen::MatrixXd pushed,
-        elastic_.system().Solve(closed_directions_ * HoldClosed(-gaps), at_rest));
+    TF_ASSIGN_OR_RETURN(Eigen::MatrixXd pushed,
+                        elastic_.system().Solve(closed_directions_ * HoldClosed(-gaps), at_rest));
     Eigen::VectorXd local = pushed.col(0);
     FromLocal(&local);
     by_unknown += local;

@@ -98,9 +98,9 @@ class TurningContact {
   const MeshPreparation& preparation_;
   const ElasticSystem& elastic_;
   const std::vector<ContactRow>& rows_;
-  const std::vector<int32_t>& unilateral_;    // indices in rows_
-  std::vector<SlidingVertex> sliding_;        // rising
-  std::vector<int32_t> sliding_of_vertex_;    // #V: index in sliding_ or -1
+  const std::vector<int32_t>& unilateral_;  // indices in rows_
+  std::vector<SlidingVertex> sliding_;      // rising
+  std::vector<int32_t> sliding_of_vertex_;  // #V: index in sliding_ or -1
 
   // At the poses.
   std::vector<Eigen::Vector3d> normals_;  // of all rows

@@ -106,7 +106,8 @@ TEST(TurningContactTest, ASmallMotionIsAnsweredAsByTheLinearModel) {
   linear.model = DeformationModel::kLinearElastic;
   const auto linear_elastic = *CreateDeformer(preparation, linear);
   const auto distance = [&](double part) {
-    HandlePose pose = Pose(part * Eigen::Vector3d(0.2, -0.1, 0.3), part * Eigen::Vector3d(1, 2, -1));
+    HandlePose pose =
+        Pose(part * Eigen::Vector3d(0.2, -0.1, 0.3), part * Eigen::Vector3d(1, 2, -1));
     return (neo_hookean->Deform({pose})->positions - linear_elastic->Deform({pose})->positions)
         .cwiseAbs()
         .maxCoeff();
@@ -127,8 +128,7 @@ TEST(TurningContactTest, AMovementOfEverythingIsThatMovementWithoutAnyForce) {
   for (ContactRow& row : block.rows_) row.gap_mm = 0;
   const auto preparation = block.Prepare();
   const HandlePose pose = Pose({0.6, -0.4, 0.7}, {3, -2, 5});
-  const Deformation answer =
-      *(*CreateDeformer(preparation, NeoHookean(1e-6)))->Deform({pose});
+  const Deformation answer = *(*CreateDeformer(preparation, NeoHookean(1e-6)))->Deform({pose});
   EXPECT_TRUE(answer.summary.converged);
   for (Eigen::Index v = 0; v < answer.positions.rows(); ++v) {
     const Eigen::Vector3d expected = ApplyPose(pose, block.mesh_.positions().row(v));
