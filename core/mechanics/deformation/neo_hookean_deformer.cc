@@ -138,7 +138,8 @@ struct ContactState {
 int64_t BytesNeeded(const MeshPreparation& preparation, const NeoHookeanOptions& options) {
   const Eigen::Index num_vertices = preparation.mesh().num_vertices();
   const auto handles = static_cast<int64_t>(preparation.constraints().handles().size());
-  return NeoHookeanEnergy::BytesNeeded(preparation.mesh().num_tets()) +
+  return TurningContact::BytesNeeded(preparation.constraints()) +
+         NeoHookeanEnergy::BytesNeeded(preparation.mesh().num_tets()) +
          EquilibriumSearch::BytesNeeded(num_vertices, options.history) +
          num_vertices * handles * static_cast<int64_t>(sizeof(double));
 }
@@ -167,8 +168,7 @@ class NeoHookeanDeformer : public Deformer {
     summary_.factorise_seconds = factorization.factorise_seconds;
     summary_.prepare_seconds = elastic_.response_seconds();
     summary_.factor_bytes = factorization.factor_bytes;
-    summary_.own_bytes =
-        BytesNeeded(*preparation_, options_) + (contact_ != nullptr ? contact_->bytes_held() : 0);
+    summary_.own_bytes = BytesNeeded(*preparation_, options_);
     summary_.bytes_held = preparation_->bytes_held() + summary_.own_bytes;
   }
 
@@ -365,6 +365,7 @@ class NeoHookeanDeformer : public Deformer {
       const std::vector<int32_t> violations = Violations();
       const bool meets_rows = contact_->Miss(search_.displacements()) <= kLargestMiss;
       if (violations.empty() && meets_rows) return true;
+      if (!MayGoOn(run)) return false;
       TF_ASSIGN_OR_RETURN(const bool exchanged,
                           Exchange(violations, exchanges->MayExchangeAll(violations.size() +
                                                                          (meets_rows ? 0 : 1))));

@@ -261,8 +261,10 @@ absl::StatusOr<Eigen::VectorXd> TurningContact::Respond(const Eigen::VectorXd& f
   return response;
 }
 
-int64_t TurningContact::bytes_held() const {
-  const auto rows = static_cast<int64_t>(unilateral_.size());
+int64_t TurningContact::BytesNeeded(const ConstraintSet& constraints) {
+  // The compliance of the unilateral rows and two factors of the closed ones.
+  const auto lifts_off = [](const ContactRow& row) { return !row.bilateral; };
+  const int64_t rows = std::ranges::count_if(constraints.contact(), lifts_off);
   return 3 * rows * rows * static_cast<int64_t>(sizeof(double));
 }
 

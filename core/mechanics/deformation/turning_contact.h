@@ -68,7 +68,8 @@ class TurningContact {
   using Solve = std::function<absl::StatusOr<Eigen::VectorXd>(const Eigen::VectorXd& forces)>;
   absl::StatusOr<Eigen::VectorXd> Respond(const Eigen::VectorXd& forces, const Solve& solve) const;
 
-  int64_t bytes_held() const;
+  // What it holds at most.
+  static int64_t BytesNeeded(const ConstraintSet& constraints);
 
  private:
   using PseudoInverse = Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>;

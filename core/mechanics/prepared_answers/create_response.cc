@@ -16,10 +16,10 @@ namespace tissueform {
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const ResponseOptions& options, const Cancellation& cancellation) {
-  if (options.model != DeformationModel::kLinearElastic) {
-    TF_RETURN_IF_ERROR(
-        CheckWithoutContact(preparation->constraints(),
-                            absl::StrCat(TraitsOf(options.model).name, " in prepared answers")));
+  const ModelTraits& model = TraitsOf(options.model);
+  if (!model.has_prepared_contact) {
+    TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(),
+                                           absl::StrCat(model.name, " in prepared answers")));
   }
   if (options.model == DeformationModel::kLinearElastic) {
     return CreateLinearElasticResponse(preparation, vertices,

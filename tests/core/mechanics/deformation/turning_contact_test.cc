@@ -164,6 +164,32 @@ TEST(TurningContactTest, AnswersDoNotDependOnTheDragBefore) {
   }
 }
 
+// Pressed through the block and far beyond.
+TEST(TurningContactTest, WhatCannotBeReachedIsSaid) {
+  const auto preparation = SlidingBlock().Prepare();
+  const auto deformer = *CreateDeformer(preparation, NeoHookean());
+  const Deformation answer = *deformer->Deform({Pose({0, 0, 0}, {0, 0, -15})});
+  EXPECT_FALSE(answer.summary.converged);
+  EXPECT_LT(answer.summary.load, 1);
+  EXPECT_GT(answer.summary.load, 0.2);
+  EXPECT_THAT(answer.summary.obstacle, HasSubstr("bone"));
+  // At the load that was reached the rows hold.
+  const HandlePose reached = Pose({0, 0, 0}, {0, 0, -15 * answer.summary.load});
+  const Eigen::VectorXd gaps =
+      GapsOf(*preparation, answer.positions - preparation->mesh().positions(), reached, true);
+  size_t unilateral = 0;
+  for (size_t r = 0; r < preparation->constraints().contact().size(); ++r) {
+    const double gap = gaps[static_cast<Eigen::Index>(r)];
+    if (preparation->constraints().contact()[r].bilateral) {
+      EXPECT_NEAR(gap, 0, 1e-6);
+    } else {
+      EXPECT_NEAR(gap, answer.contact.gaps_mm[unilateral++], 1e-9);
+    }
+  }
+  // The next answer is not harmed.
+  EXPECT_TRUE(deformer->Deform({Pose({0, 0, 0}, {0, 0, -0.3})})->summary.converged);
+}
+
 TEST(TurningContactTest, AVertexThatSlidesOnTwoBonesIsRefused) {
   SlidingBlock block(/*only_bilateral=*/true);
   ContactRow row = block.rows_[0];
