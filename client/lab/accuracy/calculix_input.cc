@@ -249,8 +249,10 @@ std::string CalculixInput(const CalculixProblem& problem) {
   const int tissues = AppendTissues(problem, &text);
   AppendContact(problem, &text);
   // Increments: first, whole, smallest and largest share of the load.
-  absl::StrAppend(&text, is_linear ? "*STEP\n*STATIC\n"
-                                   : "*STEP, NLGEOM, INC=1000\n*STATIC\n0.2, 1, 1e-5, 0.5\n");
+  // CalculiX turns the normals of a contact pair only between increments.
+  const bool turns = !is_linear && problem.contact == CalculixContact::kSurfaces;
+  absl::StrAppend(&text, is_linear ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=1000\n*STATIC\n");
+  if (!is_linear) absl::StrAppend(&text, turns ? "0.02, 1, 1e-5, 0.02\n" : "0.2, 1, 1e-5, 0.5\n");
   AppendBoundary(problem, &text);
   AppendBoneMotions(problem, &text);
   // The last increment is printed whatever the frequency.

@@ -10,6 +10,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/mechanics/deformation/anderson_acceleration.h"
+#include "core/mechanics/deformation/contact_reconstruction.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/handle_targets.h"
 #include "core/mechanics/deformation/poisson_reconstruction.h"
@@ -19,6 +20,9 @@
 namespace tissueform {
 namespace {
 
+// By which rounding alone makes the closed gaps of an extrapolated iterate negative.
+constexpr double kLargestPenetration = 1e-9;  // mm
+
 class ArapDeformer : public Deformer {
  public:
   ArapDeformer(std::shared_ptr<MeshPreparation> preparation, const PreparedLaplacian& laplacian,
@@ -26,7 +30,8 @@ class ArapDeformer : public Deformer {
       : shared_(std::move(preparation)),
         elements_(shared_->elements()),
         laplacian_(laplacian),
-        options_(options) {
+        options_(options),
+        reconstruction_(laplacian) {
     const FactorizationSummary& factorization = laplacian.system->factorization();
     preparation_.assemble_seconds = laplacian.assemble_seconds;
     preparation_.analyse_seconds = factorization.analyse_seconds;
@@ -60,20 +65,30 @@ class ArapDeformer : public Deformer {
       if (last || control.on_progress) {
         deformation.positions =
             ToPositions(shared_->constraints(), elements_.rest, state.displacements, targets);
+        deformation.contact = reconstruction_.Describe(state.displacements, state.forces, targets);
       }
       summary.cancelled = !last && control.on_progress && !control.on_progress(deformation);
       return last || summary.cancelled;
     };
     while (!report()) {
-      TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd image, Reconstruct(targets));
+      TF_ASSIGN_OR_RETURN(const ContactReconstruction::Answer image, Reconstruct(targets));
       ++summary.iterations;
-      summary.changes_mm.push_back((image - state.displacements).rowwise().norm().maxCoeff());
-      summary.converged = summary.changes_mm.back() <= options_.tolerance_mm;
-      const Eigen::MatrixXd accelerated = acceleration.Next(state.displacements, image);
+      summary.changes_mm.push_back(
+          (image.displacements - state.displacements).rowwise().norm().maxCoeff());
+      summary.converged = image.converged && summary.changes_mm.back() <= options_.tolerance_mm;
+      state.forces = image.forces;
+      const Eigen::MatrixXd accelerated =
+          acceleration.Next(state.displacements, image.displacements);
       // Two trials: the extrapolated iterate may raise the energy, the plain image cannot but for
       // rounding (both halves of the step minimise the same energy). When even that rises, the
-      // arithmetic has nothing more to give. A converged iterate is not extrapolated from.
-      stuck = !(!summary.converged && Accept(accelerated, &state)) && !Accept(image, &state);
+      // arithmetic has nothing more to give. A converged iterate is not extrapolated from, and an
+      // extrapolated one may not penetrate: with less energy than any answer it would stay for
+      // good.
+      const bool extrapolates =
+          !summary.converged &&
+          reconstruction_.SmallestGap(accelerated, targets) >= -kLargestPenetration;
+      stuck =
+          !(extrapolates && Accept(accelerated, &state)) && !Accept(image.displacements, &state);
       summary.energies_nj.push_back(state.energy);
     }
     return deformation;
@@ -85,6 +100,7 @@ class ArapDeformer : public Deformer {
   // An iterate; loads_ belongs to it.
   struct State {
     Eigen::MatrixXd displacements;  // #V by 3
+    Eigen::VectorXd forces;         // of contact, from the last solve
     double energy = 0;
     int solves = 1;
   };
@@ -109,10 +125,10 @@ class ArapDeformer : public Deformer {
     return true;
   }
 
-  absl::StatusOr<Eigen::MatrixXd> Reconstruct(const HandleTargets& targets) {
-    const Eigen::MatrixXd rhs = GatherCornerLoads(shared_->vertex_cells(), elements_.num_vertices(),
-                                                  loads_, shared_->options().threads);
-    return laplacian_.system->Solve(rhs, targets.displacements);
+  absl::StatusOr<ContactReconstruction::Answer> Reconstruct(const HandleTargets& targets) {
+    Eigen::MatrixXd rhs = GatherCornerLoads(shared_->vertex_cells(), elements_.num_vertices(),
+                                            loads_, shared_->options().threads);
+    return reconstruction_.Solve(targets, &rhs);
   }
 
   absl::StatusOr<State> Start(absl::Span<const HandlePose> poses, const HandleTargets& targets,
@@ -120,20 +136,22 @@ class ArapDeformer : public Deformer {
     // The better of two begins: the last answer's rotations under the new poses, which are near
     // while a handle is dragged, or the propagated ones, which are near after a jump. The energy
     // decides, for one more solve. Fit at the end: loads_ must belong to the state that is kept.
-    State last;
+    ContactReconstruction::Answer last;
     const bool has_last = warm && loads_.rows() > 0 && options_.max_iterations > 1;
     if (has_last) {
-      TF_ASSIGN_OR_RETURN(last.displacements, Reconstruct(targets));
+      TF_ASSIGN_OR_RETURN(last, Reconstruct(targets));
     }
     const int threads = shared_->options().threads;
     PropagateRotations(elements_, laplacian_.harmonic, poses, threads, &loads_);
     TransformsToCornerLoads(elements_, shared_->stiffness(), threads, &loads_);
-    State state;
-    TF_ASSIGN_OR_RETURN(state.displacements, Reconstruct(targets));
+    TF_ASSIGN_OR_RETURN(ContactReconstruction::Answer first, Reconstruct(targets));
+    State state{.displacements = std::move(first.displacements), .forces = std::move(first.forces)};
     state.energy = Fit(state.displacements);
     if (has_last) {
       state.solves = 2;
-      if (!Accept(last.displacements, &state)) {
+      if (Accept(last.displacements, &state)) {
+        state.forces = last.forces;
+      } else {
         Fit(state.displacements);
       }
     }
@@ -147,6 +165,7 @@ class ArapDeformer : public Deformer {
   const ArapOptions options_;
   PreparationSummary preparation_;
 
+  ContactReconstruction reconstruction_;  // holds workspaces
   // Of the last iterate's closest rotations: what the next step, and a warm start, begins with. No
   // rows before the first pose.
   CornerLoads loads_;

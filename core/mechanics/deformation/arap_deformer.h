@@ -29,6 +29,9 @@ struct ArapOptions {
 // taken only if its energy is not above the last one, otherwise the plain step, which cannot raise
 // it; when rounding makes even that rise, the last iterate is the answer.
 //
+// Contact rows hold in every step over positions, which then minimises E among the positions that
+// meet them (LaplacianContact), and so in the answer. Closest rotations do not look at them.
+//
 // Starts from the gradient field's propagated answer. E has many local minima; plain Poisson
 // flattens the middle of a bar whose end turns by half a turn, and its closest rotations then turn
 // the wrong way or into each other, for good. The propagated field has every tet near its right

@@ -44,8 +44,19 @@ absl::Status CheckStiffness(Eigen::Index num_cells, const Eigen::VectorXd& stiff
 absl::Status CheckWithoutContact(const ConstraintSet& constraints, absl::string_view who) {
   if (constraints.contact().empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      absl::StrCat(who, " does not compute contact; leave out the contact rows, or use the model ",
-                   "linear_elastic"));
+      absl::StrCat(who, " does not compute contact; leave out the contact rows"));
+}
+
+absl::Status CheckContactMoves(const Eigen::VectorXd& typical, const Eigen::VectorXd& compliance,
+                               const std::vector<int32_t>& rows) {
+  constexpr double kNoCompliance = 1e-10;
+  for (Eigen::Index r = 0; r < compliance.size(); ++r) {
+    if (compliance[r] > kNoCompliance * typical[r]) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat("contact row ", rows[static_cast<size_t>(r)],
+                     " cannot move: its vertex slides along that normal; remove the row"));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CheckTolerance(double tolerance_mm) {

@@ -27,6 +27,11 @@ absl::Status CheckStiffness(Eigen::Index num_cells, const Eigen::VectorXd& stiff
 // InvalidArgument where tissue slides or lifts off, for `who` ("arap"), who cannot compute that.
 absl::Status CheckWithoutContact(const ConstraintSet& constraints, absl::string_view who);
 
+// InvalidArgument, naming the row, where the `compliance` of one of the contact rows `rows` is
+// rounding beside that which is `typical` for it. All three have the same length.
+absl::Status CheckContactMoves(const Eigen::VectorXd& typical, const Eigen::VectorXd& compliance,
+                               const std::vector<int32_t>& rows);
+
 // InvalidArgument unless it is a positive number.
 absl::Status CheckTolerance(double tolerance_mm);
 

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mesh/tet_topology.h"
 
 namespace tissueform {
@@ -18,8 +19,6 @@ namespace {
 
 // Right-hand sides of one pass over the factor.
 constexpr Eigen::Index kRowsPerPass = 32;
-// A row is one that cannot move if its compliance is below this share of the largest.
-constexpr double kNoCompliance = 1e-10;
 
 void AddDirection(int32_t vertex, const Eigen::Vector3d& normal, Eigen::Index row,
                   std::vector<Eigen::Triplet<double, int32_t>>* entries) {
@@ -58,7 +57,10 @@ absl::StatusOr<std::unique_ptr<ElasticContact>> ElasticContact::Create(
   }
   contact->TakeRows(mesh, constraints);
   TF_RETURN_IF_ERROR(contact->MakeCompliance(cancellation));
-  TF_RETURN_IF_ERROR(contact->CheckCompliance());
+  const Eigen::VectorXd compliance = contact->compliance_.diagonal();
+  TF_RETURN_IF_ERROR(
+      CheckContactMoves(Eigen::VectorXd::Constant(compliance.size(), compliance.maxCoeff()),
+                        compliance, contact->rows_));
   return contact;
 }
 
@@ -136,17 +138,6 @@ absl::StatusOr<Eigen::MatrixXd> ElasticContact::ForceColumns(
       },
       cancellation));
   return columns;
-}
-
-absl::Status ElasticContact::CheckCompliance() const {
-  const double largest = compliance_.diagonal().maxCoeff();
-  for (Eigen::Index r = 0; r < compliance_.rows(); ++r) {
-    if (compliance_(r, r) > kNoCompliance * largest) continue;
-    return absl::InvalidArgumentError(
-        absl::StrCat("contact row ", rows_[static_cast<size_t>(r)],
-                     " cannot move: its vertex slides along that normal; remove the row"));
-  }
-  return absl::OkStatus();
 }
 
 absl::StatusOr<Eigen::VectorXd> ElasticContact::Displacements(

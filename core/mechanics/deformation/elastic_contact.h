@@ -70,7 +70,6 @@ class ElasticContact {
   absl::Status SolveForRows(
       const std::function<void(Eigen::Index first, const Eigen::MatrixXd& responses)>& take,
       const Cancellation& cancellation) const;
-  absl::Status CheckCompliance() const;
 
   const ElasticSystem& elastic_;
   std::vector<int32_t> rows_;

@@ -26,11 +26,12 @@ constexpr double kLargestShortening = 0.5;
 }  // namespace
 
 EquilibriumSearch::EquilibriumSearch(NeoHookeanEnergy* energy, const DirichletSystem* system,
-                                     const SinglePrecisionSolver* rounded, double force_unit,
-                                     int history)
+                                     const SinglePrecisionSolver* rounded,
+                                     const TurningContact* contact, double force_unit, int history)
     : energy_(*energy),
       system_(*system),
       rounded_(rounded),
+      contact_(contact),
       force_unit_(force_unit),
       history_(history) {}
 
@@ -54,7 +55,13 @@ void EquilibriumSearch::Accept(Trial* trial) {
   std::swap(displacements_, trial->displacements);
   std::swap(gradient_, trial->gradient);
   value_ = trial->value;
-  free_gradient_ = FreePart(gradient_);
+  if (contact_ == nullptr) {
+    free_gradient_ = FreePart(gradient_);
+  } else {
+    Eigen::VectorXd local = LocalGradient();
+    contact_->Project(&local);
+    free_gradient_ = local(system_.free());
+  }
   const double free2 = free_gradient_.squaredNorm();
   const double reaction = std::sqrt(std::max(0.0, gradient_.squaredNorm() - free2));
   // Against the reactions, so that the tolerance means the same for soft and stiff, large and
@@ -69,7 +76,9 @@ absl::StatusOr<double> EquilibriumSearch::Step() {
   const auto precondition = [this](const Eigen::VectorXd& rhs) { return Precondition(rhs); };
   TF_ASSIGN_OR_RETURN(Eigen::VectorXd direction, history_.Apply(free_gradient_, precondition));
   direction = -direction;
-  const double length = SearchLine(direction, free_gradient_.dot(direction));
+  const double slope = free_gradient_.dot(direction);
+  const double length =
+      SearchLine(contact_ == nullptr ? direction : FreeAlongAxes(direction), slope);
   // No length lowers the energy along the L-BFGS direction: the remembered pairs may be of another
   // valley. Without them the direction is that of the linear stiffness alone, a sure one of
   // descent; if that fails too, this is the end of what the arithmetic can do.
@@ -124,7 +133,38 @@ Eigen::VectorXd EquilibriumSearch::FreePart(const Positions& field) const {
   return Eigen::Map<const Eigen::VectorXd>(field.data(), field.size())(system_.free());
 }
 
+Eigen::VectorXd EquilibriumSearch::WithOthers(const Eigen::VectorXd& free) const {
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(system_.num_unknowns());
+  all(system_.free()) = free;
+  return all;
+}
+
+Eigen::VectorXd EquilibriumSearch::FreeAlongAxes(const Eigen::VectorXd& local) const {
+  Eigen::VectorXd all = WithOthers(local);
+  contact_->FromLocal(&all);
+  return all(system_.free());
+}
+
+Eigen::VectorXd EquilibriumSearch::LocalGradient() const {
+  Eigen::VectorXd local = Eigen::Map<const Eigen::VectorXd>(gradient_.data(), gradient_.size());
+  contact_->ToLocal(&local);
+  return local;
+}
+
 absl::StatusOr<Eigen::VectorXd> EquilibriumSearch::Precondition(const Eigen::VectorXd& rhs) {
+  if (contact_ == nullptr) return Solve(rhs);
+  TF_ASSIGN_OR_RETURN(
+      const Eigen::VectorXd response,
+      contact_->Respond(WithOthers(rhs),
+                        [this](const Eigen::VectorXd& forces) -> absl::StatusOr<Eigen::VectorXd> {
+                          TF_ASSIGN_OR_RETURN(const Eigen::VectorXd solution,
+                                              Solve(forces(system_.free())));
+                          return WithOthers(solution);
+                        }));
+  return Eigen::VectorXd(response(system_.free()));
+}
+
+absl::StatusOr<Eigen::VectorXd> EquilibriumSearch::Solve(const Eigen::VectorXd& rhs) {
   if (tangent_ == nullptr && rounded_ != nullptr) {
     // Forces of any size fit into single precision as shares of the largest.
     const double unit = rhs.lpNorm<Eigen::Infinity>();

@@ -9,6 +9,7 @@
 
 #include "core/base/types.h"
 #include "core/mechanics/deformation/lbfgs_history.h"
+#include "core/mechanics/deformation/turning_contact.h"
 #include "core/mechanics/elasticity/neo_hookean_energy.h"
 #include "core/mechanics/linear_solvers/dirichlet_system.h"
 
@@ -17,14 +18,18 @@ namespace tissueform {
 // Walks towards the minimum of a neo-Hookean energy over the free vertices, the constrained ones
 // staying where the start has them, by L-BFGS with the factorised linear stiffness as first inverse
 // Hessian (Liu, Bouaziz, Kavan 2017). Every state has all tets positive, and the energy does not
-// rise. One thread at a time.
+// rise. With contact it keeps to displacements that leave the gaps of the bilateral and closed rows
+// as the start has them. One thread at a time.
 class EquilibriumSearch {
  public:
   // Refers to energy and system. `system` is the linear stiffness with unknowns 3 v + axis, three
   // for every free vertex; `rounded` stands in for its factor, or is null. `force_unit` is the
   // size, in Pa mm^2, of the forces below which rounding is all that is left; see residual().
+  // `contact`, which may be null, has the local unknowns of `system`; after it has changed, Start
+  // is to be called.
   EquilibriumSearch(NeoHookeanEnergy* energy, const DirichletSystem* system,
-                    const SinglePrecisionSolver* rounded, double force_unit, int history);
+                    const SinglePrecisionSolver* rounded, const TurningContact* contact,
+                    double force_unit, int history);
 
   // Goes on from these displacements (#V by 3, mm), forgetting the steps so far. False, and nothing
   // is changed, when they invert a tet.
@@ -45,10 +50,12 @@ class EquilibriumSearch {
   // Of the last step, as a part of the whole one; 0 before the first.
   double step_length() const { return step_length_; }
   // The norm of the forces on the free vertices, which vanish in equilibrium, over that of the
-  // forces that the constrained vertices bear plus force_unit.
+  // forces that the constrained vertices, and rows of contact, bear plus force_unit.
   double residual() const { return residual_; }
   const Positions& displacements() const { return displacements_; }
   const NeoHookeanEnergy::Value& value() const { return value_; }
+  // Of the unilateral rows of contact, in Pa mm^2. REQUIRES: contact.
+  Eigen::VectorXd ContactForces() const { return contact_->Forces(LocalGradient()); }
   // What a search holds at most.
   static int64_t BytesNeeded(Eigen::Index num_vertices, int history);
 
@@ -64,11 +71,18 @@ class EquilibriumSearch {
   // Sets trial_ to the accepted point and returns the length, or 0.
   double SearchLine(const Eigen::VectorXd& direction, double slope);
   Eigen::VectorXd FreePart(const Positions& field) const;
+  // All unknowns of the free ones, the others zero.
+  Eigen::VectorXd WithOthers(const Eigen::VectorXd& free) const;
+  // Free local unknowns along x, y and z. REQUIRES: contact, as the next one.
+  Eigen::VectorXd FreeAlongAxes(const Eigen::VectorXd& local) const;
+  Eigen::VectorXd LocalGradient() const;
+  absl::StatusOr<Eigen::VectorXd> Solve(const Eigen::VectorXd& rhs);
   absl::StatusOr<Eigen::VectorXd> Precondition(const Eigen::VectorXd& rhs);
 
   NeoHookeanEnergy& energy_;
   const DirichletSystem& system_;
   const SinglePrecisionSolver* const rounded_;  // may be null
+  const TurningContact* const contact_;         // may be null
   const double force_unit_;
 
   // The state.

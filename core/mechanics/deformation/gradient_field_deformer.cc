@@ -11,6 +11,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/mechanics/deformation/anderson_acceleration.h"
+#include "core/mechanics/deformation/contact_reconstruction.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/handle_targets.h"
 #include "core/mechanics/deformation/harmonic_fields.h"
@@ -39,13 +40,14 @@ class GradientFieldDeformer : public Deformer {
   GradientFieldDeformer(SharedParts parts, GradientFieldOptions options)
       : parts_(std::move(parts)),
         elements_(parts_.elements),
-        laplacian_(parts_.laplacian->system.get()),
-        options_(std::move(options)) {}
+        laplacian_(*parts_.laplacian->system),
+        options_(std::move(options)),
+        reconstruction_(*parts_.laplacian) {}
 
   absl::Status Prepare(const Cancellation& cancellation) {
     preparation_.assemble_seconds = parts_.laplacian->assemble_seconds;
     preparation_.negative_weights = parts_.laplacian->negative_weights;
-    const FactorizationSummary& factorization = laplacian_->factorization();
+    const FactorizationSummary& factorization = laplacian_.factorization();
     preparation_.analyse_seconds = factorization.analyse_seconds;
     preparation_.factorise_seconds = factorization.factorise_seconds;
     preparation_.factor_bytes = factorization.factor_bytes;
@@ -67,9 +69,11 @@ class GradientFieldDeformer : public Deformer {
       return Iterate(target, control, stopwatch);
     }
     TransformsToCornerLoads(elements_, parts_.stiffness, options_.threads, &propagated_);
-    TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements, Reconstruct(propagated_, target));
+    TF_ASSIGN_OR_RETURN(const ContactReconstruction::Answer answer,
+                        Reconstruct(propagated_, target));
     Deformation deformation;
-    deformation.positions = ToPositions(parts_.constraints, elements_.rest, displacements, target);
+    Describe(answer, target, &deformation);
+    deformation.summary.converged = answer.converged;
     deformation.summary.solve_seconds = stopwatch.Seconds();
     deformation.summary.residual = last_residual_;
     return deformation;
@@ -104,7 +108,7 @@ class GradientFieldDeformer : public Deformer {
           const auto uniform,
           DirichletSystem::Create(
               UniformLaplacian(elements_.cells, elements_.num_vertices(), options_.threads),
-              parts_.constraints.constrained(), {options_.backend, options_.admission},
+              GuidedVertices(parts_.constraints), {options_.backend, options_.admission},
               cancellation));
       TF_ASSIGN_OR_RETURN(uniform_harmonic_,
                           ComputeHarmonicFields(parts_.constraints, uniform.get()));
@@ -119,17 +123,23 @@ class GradientFieldDeformer : public Deformer {
     return absl::OkStatus();
   }
 
-  // One linear solve: displacements, #V by 3, under the loads of turned cells (empty: not turned).
-  absl::StatusOr<Eigen::MatrixXd> Reconstruct(const CornerLoads& loads,
-                                              const HandleTargets& target) {
-    const Eigen::MatrixXd rhs =
+  // One linear solve under the loads of turned cells (empty: not turned).
+  absl::StatusOr<ContactReconstruction::Answer> Reconstruct(const CornerLoads& loads,
+                                                            const HandleTargets& target) {
+    Eigen::MatrixXd rhs =
         GatherCornerLoads(parts_.vertex_cells, elements_.num_vertices(), loads, options_.threads);
-    TF_ASSIGN_OR_RETURN(Eigen::MatrixXd displacements,
-                        laplacian_->Solve(rhs, target.displacements));
+    TF_ASSIGN_OR_RETURN(ContactReconstruction::Answer answer, reconstruction_.Solve(target, &rhs));
     if (options_.compute_residual) {
-      last_residual_ = laplacian_->RelativeResidual(rhs, displacements);
+      last_residual_ = laplacian_.RelativeResidual(rhs, answer.displacements);
     }
-    return displacements;
+    return answer;
+  }
+
+  void Describe(const ContactReconstruction::Answer& answer, const HandleTargets& target,
+                Deformation* deformation) const {
+    deformation->positions =
+        ToPositions(parts_.constraints, elements_.rest, answer.displacements, target);
+    deformation->contact = reconstruction_.Describe(answer.displacements, answer.forces, target);
   }
 
   // Fixed-point iteration of the `estimated` mode: estimate rotations, blend, reconstruct.
@@ -140,37 +150,37 @@ class GradientFieldDeformer : public Deformer {
       TransformsToCornerLoads(elements_, parts_.stiffness, options_.threads, &last_loads_);
     }
     AndersonAcceleration acceleration(options_.acceleration_depth);
-    TF_ASSIGN_OR_RETURN(Eigen::MatrixXd iterate, Reconstruct(last_loads_, target));
+    TF_ASSIGN_OR_RETURN(const ContactReconstruction::Answer first,
+                        Reconstruct(last_loads_, target));
     Deformation deformation;
     SolveSummary& summary = deformation.summary;
     summary.converged = false;
     // Positions are made only where somebody sees them.
-    const auto report = [&](const Eigen::MatrixXd& displacements) {
+    const auto report = [&](const ContactReconstruction::Answer& answer) {
       summary.solve_seconds = stopwatch.Seconds();
       summary.residual = last_residual_;
       const bool last = summary.converged || summary.iterations >= options_.max_iterations;
-      if (last || control.on_progress) {
-        deformation.positions =
-            ToPositions(parts_.constraints, elements_.rest, displacements, target);
-      }
+      if (last || control.on_progress) Describe(answer, target, &deformation);
       summary.cancelled = !last && control.on_progress && !control.on_progress(deformation);
     };
-    report(iterate);
+    report(first);
+    Eigen::MatrixXd iterate = first.displacements;
     while (!summary.converged && !summary.cancelled &&
            summary.iterations < options_.max_iterations) {
       EstimateRotations(elements_, elements_.rest + iterate, blend_weights_, propagated_,
                         options_.threads, &last_loads_);
       TransformsToCornerLoads(elements_, parts_.stiffness, options_.threads, &last_loads_);
-      TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd image, Reconstruct(last_loads_, target));
+      TF_ASSIGN_OR_RETURN(const ContactReconstruction::Answer image,
+                          Reconstruct(last_loads_, target));
       ++summary.iterations;
       // By what the plain step does, not the accelerated one: only that is zero at the fixed point
       // and nowhere else.
-      summary.changes_mm.push_back((image - iterate).rowwise().norm().maxCoeff());
-      summary.converged = summary.changes_mm.back() <= options_.tolerance_mm;
+      summary.changes_mm.push_back((image.displacements - iterate).rowwise().norm().maxCoeff());
+      summary.converged = image.converged && summary.changes_mm.back() <= options_.tolerance_mm;
       // The image, not the extrapolated iterate, is what is shown and answered: it is the Poisson
       // reconstruction of rotations, which an extrapolation is not.
       report(image);
-      iterate = acceleration.Next(iterate, image);
+      iterate = acceleration.Next(iterate, image.displacements);
     }
     return deformation;
   }
@@ -178,12 +188,13 @@ class GradientFieldDeformer : public Deformer {
   // Constant after Prepare.
   const SharedParts parts_;
   const PiecewiseLinearElements& elements_;
-  DirichletSystem* const laplacian_;  // holds workspaces
+  const DirichletSystem& laplacian_;
   const GradientFieldOptions options_;
   Eigen::MatrixXd uniform_harmonic_;  // #V by #handles; empty unless guidance is uniform
   Eigen::VectorXd blend_weights_;     // #C; empty unless rotations are estimated
   PreparationSummary preparation_;
 
+  ContactReconstruction reconstruction_;  // holds workspaces
   double last_residual_ = 0;
   // Of the last poses; their loads once a mode that does not iterate has them. No rows in mode
   // kNone.

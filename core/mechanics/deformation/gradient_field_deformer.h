@@ -54,6 +54,10 @@ struct GradientFieldOptions {
 // scales over the cells, a Poisson equation stitches the turned cells together. Harmonic fields and
 // reconstruction share one factor.
 //
+// Contact rows hold in the reconstruction, which then fits the turned cells best among the
+// positions that meet them (LaplacianContact). Where tissue slides on a bone its cells turn with
+// the bone (GuidedVertices).
+//
 // `stiffness` is Young's modulus per cell in Pa, one positive number each. Keeps nothing of its
 // arguments.
 //

@@ -30,8 +30,17 @@ Positions ConstrainedPositions(const Eigen::Ref<const Positions>& rest,
 HandleTargets MakeHandleTargets(const ConstraintSet& constraints,
                                 const Eigen::Ref<const Positions>& rest,
                                 absl::Span<const HandlePose> poses) {
-  HandleTargets targets{ConstrainedPositions(rest, constraints, poses), {}};
+  HandleTargets targets{ConstrainedPositions(rest, constraints, poses), {}, {}};
   targets.displacements = targets.positions - rest(constraints.constrained(), Eigen::all);
+  targets.resting_gaps.resize(static_cast<Eigen::Index>(constraints.contact().size()));
+  for (Eigen::Index r = 0; r < targets.resting_gaps.size(); ++r) {
+    const ContactRow& row = constraints.contact()[static_cast<size_t>(r)];
+    targets.resting_gaps[r] = row.gap_mm;
+    if (row.handle == ContactRow::kFixedBone) continue;
+    const Eigen::Vector3d place = rest.row(row.vertex);
+    targets.resting_gaps[r] -=
+        row.normal.dot(ApplyPose(poses[static_cast<size_t>(row.handle)], place) - place);
+  }
   return targets;
 }
 

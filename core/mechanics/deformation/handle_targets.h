@@ -17,10 +17,13 @@ Positions ConstrainedPositions(const Eigen::Ref<const Positions>& rest,
                                const ConstraintSet& constraints,
                                absl::Span<const HandlePose> poses);
 
-// Where the constrained vertices go, #constrained by 3, in the order of constraints.constrained().
+// Where the constrained vertices go, #constrained by 3, in the order of constraints.constrained(),
+// and bone with them.
 struct HandleTargets {
   Positions positions;
   Positions displacements;  // against rest; zero to the bit for handles with an identity pose
+  // The gap in mm that every contact row would have if tissue stayed and only bone moved.
+  Eigen::VectorXd resting_gaps;
 };
 
 // REQUIRES: one legal pose per handle; `rest` is #V by 3.

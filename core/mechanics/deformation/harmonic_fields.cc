@@ -3,18 +3,43 @@
 
 #include "core/mechanics/deformation/harmonic_fields.h"
 
+#include <map>
+
 namespace tissueform {
+
+namespace {
+
+// The region that each guided vertex goes with; that of its first row where it slides on several.
+std::map<int32_t, int> GuidingRegions(const ConstraintSet& constraints) {
+  std::map<int32_t, int> regions;
+  for (size_t c = 0; c < constraints.constrained().size(); ++c) {
+    regions[constraints.constrained()[c]] = constraints.region_of_constrained()[c];
+  }
+  for (const ContactRow& row : constraints.contact()) {
+    if (row.bilateral) regions.emplace(row.vertex, row.handle);
+  }
+  return regions;
+}
+static_assert(ContactRow::kFixedBone == ConstraintSet::kFixed);
+
+}  // namespace
+
+std::vector<int32_t> GuidedVertices(const ConstraintSet& constraints) {
+  std::vector<int32_t> vertices;
+  for (const auto& [vertex, region] : GuidingRegions(constraints)) vertices.push_back(vertex);
+  return vertices;
+}
 
 absl::StatusOr<Eigen::MatrixXd> ComputeHarmonicFields(const ConstraintSet& constraints,
                                                       DirichletSystem* laplacian) {
-  const std::vector<int>& regions = constraints.region_of_constrained();
+  const std::map<int32_t, int> regions = GuidingRegions(constraints);
   Eigen::MatrixXd values =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(regions.size()),
                             static_cast<Eigen::Index>(constraints.handles().size()));
-  for (size_t c = 0; c < regions.size(); ++c) {
-    if (regions[c] != ConstraintSet::kFixed) {
-      values(static_cast<Eigen::Index>(c), regions[c]) = 1;
-    }
+  Eigen::Index place = 0;
+  for (const auto& [vertex, region] : regions) {
+    if (region != ConstraintSet::kFixed) values(place, region) = 1;
+    ++place;
   }
   // All handles in one pass over the factor. What leaves [0, 1], because obtuse tets have negative
   // weights, is left so and reported (harmonic_min, harmonic_max): clamping would break the sum of

@@ -3,6 +3,9 @@
 
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "absl/status/statusor.h"
 
 #include "core/base/types.h"
@@ -12,11 +15,17 @@
 
 namespace tissueform {
 
-// One harmonic field per handle, #V by #handles: L u_h = 0 at free vertices, u_h = 1 on handle h, 0
-// on the fixed region and on the other handles (Liao et al. 2009, Eq. 8). With the field of the
-// fixed region they sum to one. Values lie in [0, 1] unless L has negative weights.
+// The vertices at which harmonic fields are given, rising: the constrained ones, and those that
+// slide on a bone (have a bilateral contact row), since tissue that slides on a bone turns with it.
+// With rows in all directions they are like others of the region.
+std::vector<int32_t> GuidedVertices(const ConstraintSet& constraints);
+
+// One harmonic field per handle, #V by #handles: L u_h = 0 at free vertices, u_h = 1 on handle h
+// and where tissue slides on it, 0 on the fixed region and on the other handles (Liao et al. 2009,
+// Eq. 8). With the field of the fixed region they sum to one. Values lie in [0, 1] unless L has
+// negative weights.
 //
-// `laplacian` is the Dirichlet system of L with constraints.constrained() prescribed; all fields
+// `laplacian` is the Dirichlet system of L with GuidedVertices(constraints) prescribed; all fields
 // are solved in one pass over its factor.
 absl::StatusOr<Eigen::MatrixXd> ComputeHarmonicFields(const ConstraintSet& constraints,
                                                       DirichletSystem* laplacian);

@@ -34,13 +34,28 @@ absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
                       DirichletSystem::Create(L, constraints.constrained(), options, cancellation));
   TellProgress(options.observer, PreparationStage::kResponses);
   const Stopwatch stopwatch;
-  TF_ASSIGN_OR_RETURN(laplacian->harmonic,
-                      ComputeHarmonicFields(constraints, laplacian->system.get()));
+  const std::vector<int32_t> guided = GuidedVertices(constraints);
+  if (guided.size() == constraints.constrained().size()) {
+    TF_ASSIGN_OR_RETURN(laplacian->harmonic,
+                        ComputeHarmonicFields(constraints, laplacian->system.get()));
+  } else {
+    DirichletSystem::Options for_fields = options;
+    for_fields.node_order = laplacian->system->node_order();
+    for_fields.observer = nullptr;
+    TF_ASSIGN_OR_RETURN(const auto system,
+                        DirichletSystem::Create(L, guided, for_fields, cancellation));
+    TF_ASSIGN_OR_RETURN(laplacian->harmonic, ComputeHarmonicFields(constraints, system.get()));
+  }
+  TF_ASSIGN_OR_RETURN(
+      laplacian->contact,
+      LaplacianContact::Create(constraints, *laplacian->system, options.admission, cancellation));
   laplacian->harmonic_seconds = stopwatch.Seconds();
   return laplacian;
 }
 
-int64_t PreparedLaplacian::bytes_held() const { return system->bytes_held() + BytesOf(harmonic); }
+int64_t PreparedLaplacian::bytes_held() const {
+  return system->bytes_held() + BytesOf(harmonic) + contact->bytes_held();
+}
 
 namespace {
 

@@ -14,6 +14,7 @@
 #include "core/mechanics/constraints/constraint_set.h"
 #include "core/mechanics/deformation/elastic_contact.h"
 #include "core/mechanics/deformation/elastic_system.h"
+#include "core/mechanics/deformation/laplacian_contact.h"
 #include "core/mechanics/linear_solvers/dirichlet_system.h"
 #include "core/mesh/operators/piecewise_linear_elements.h"
 #include "core/mesh/tet_mesh.h"
@@ -42,6 +43,7 @@ struct PreparationOptions {
 struct PreparedLaplacian {
   std::unique_ptr<DirichletSystem> system;
   Eigen::MatrixXd harmonic;  // #V by #handles
+  std::unique_ptr<LaplacianContact> contact;
   double assemble_seconds = 0;
   double harmonic_seconds = 0;
   Eigen::Index negative_weights = 0;
@@ -49,9 +51,10 @@ struct PreparedLaplacian {
   int64_t bytes_held() const;
 };
 
-// Factorises L and computes the harmonic fields; assemble_seconds is left to the caller, who made
-// L. Errors: FailedPrecondition (not positive definite), ResourceExhausted, Cancelled, or what the
-// admission says.
+// Factorises L, computes the harmonic fields and condenses the contact rows; assemble_seconds is
+// left to the caller, who made L. Harmonic fields of tissue that slides take a second factor, which
+// is given back at once. Errors: FailedPrecondition (not positive definite), ResourceExhausted,
+// Cancelled, those of LaplacianContact::Create, or what the admission says.
 absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
     const SparseMatrix& L, const ConstraintSet& constraints,
     const DirichletSystem::Options& options, const Cancellation& cancellation = {});

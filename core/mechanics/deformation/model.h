@@ -25,6 +25,8 @@ struct ModelTraits {
   bool has_prepared_answers;
   // Tissue that touches bone or other tissue (ConstraintSet::contact) slides and lifts off.
   bool has_contact;
+  // ... also in prepared answers.
+  bool has_prepared_contact;
 };
 
 // One row for each model, in the order in which users see them.

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -16,12 +18,14 @@
 
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/mechanics/contact/lcp_solver.h"
 #include "core/mechanics/deformation/contact_blocker.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/equilibrium_search.h"
 #include "core/mechanics/deformation/handle_targets.h"
 #include "core/mechanics/deformation/load_path.h"
 #include "core/mechanics/deformation/newton_fallback.h"
+#include "core/mechanics/deformation/turning_contact.h"
 #include "core/mechanics/elasticity/neo_hookean_energy.h"
 
 namespace tissueform {
@@ -40,6 +44,17 @@ constexpr double kCrushed = 0.1;
 constexpr double kStepTolerance = 0.02;
 // Strain whose forces are added to those that the residual is measured by.
 constexpr double kSmallStrain = 1e-6;
+// Of a row of contact, in mm: what it may penetrate, or the gap that the force would close with
+// which it may pull. An equilibrium is not found more exactly.
+constexpr double kLargestPenetration = 1e-3;
+// The gap in mm of a row that is met: rounding.
+constexpr double kLargestMiss = 1e-7;
+// Exchanges of all violating rows that may pass without reducing their number; all exchanges at one
+// load.
+constexpr int kBlockPatience = 5;
+constexpr int kMaxExchanges = 200;
+// Of the way to where exchanged rows are met.
+constexpr double kSmallestCorrection = 1.0 / 16;
 // Up to this condition number the factor rounded to single precision preconditions as well as the
 // factor itself, in half the time.
 constexpr double kLargestRoundedCondition = 1e6;
@@ -95,27 +110,56 @@ bool UsesRoundedFactor(const ElasticSystem& elastic) {
          elastic.condition_estimate() <= kLargestRoundedCondition;
 }
 
+// The closed rows of contact before an exchange, and how often it was told.
+struct ExchangeRun {
+  size_t fewest_violations = std::numeric_limits<size_t>::max();
+  int patience = kBlockPatience;
+  int left = kMaxExchanges;
+
+  // Whether so many rows may be exchanged at once. If that stops reducing their number, one at a
+  // time always ends (LcpSolver).
+  bool MayExchangeAll(size_t violations) {
+    if (violations < fewest_violations) {
+      fewest_violations = violations;
+      patience = kBlockPatience;
+      return true;
+    }
+    return patience-- > 0;
+  }
+};
+
+// Of the unilateral rows.
+struct ContactState {
+  Eigen::VectorXd forces;
+  Eigen::VectorXd gaps;
+};
+
 // What a deformer holds beside the preparation.
 int64_t BytesNeeded(const MeshPreparation& preparation, const NeoHookeanOptions& options) {
   const Eigen::Index num_vertices = preparation.mesh().num_vertices();
   const auto handles = static_cast<int64_t>(preparation.constraints().handles().size());
-  return NeoHookeanEnergy::BytesNeeded(preparation.mesh().num_tets()) +
+  return TurningContact::BytesNeeded(preparation.constraints()) +
+         NeoHookeanEnergy::BytesNeeded(preparation.mesh().num_tets()) +
          EquilibriumSearch::BytesNeeded(num_vertices, options.history) +
          num_vertices * handles * static_cast<int64_t>(sizeof(double));
 }
 
 class NeoHookeanDeformer : public Deformer {
  public:
-  // `rounded` may be null.
+  // `rounded` and both of contact may be null.
   NeoHookeanDeformer(std::shared_ptr<MeshPreparation> preparation, const ElasticSystem& elastic,
-                     const SinglePrecisionSolver* rounded, const NeoHookeanOptions& options)
+                     const SinglePrecisionSolver* rounded, const ElasticContact* linear_contact,
+                     std::unique_ptr<TurningContact> contact, const NeoHookeanOptions& options)
       : preparation_(std::move(preparation)),
         elastic_(elastic),
+        linear_contact_(linear_contact),
         options_(options),
         shares_(HandleShares(elastic, rest().rows())),
         energy_(preparation_->elements(), preparation_->vertex_cells(), preparation_->stiffness(),
                 preparation_->options().poisson_ratio, preparation_->options().threads),
-        search_(&energy_, &elastic.system(), rounded, ForceUnit(*preparation_), options.history),
+        contact_(std::move(contact)),
+        search_(&energy_, &elastic.system(), rounded, contact_.get(), ForceUnit(*preparation_),
+                options.history),
         newton_(preparation_.get(), &elastic, &search_, options.newton_after,
                 options.newton_blas_threads) {
     const FactorizationSummary& factorization = elastic_.system().factorization();
@@ -173,14 +217,20 @@ class NeoHookeanDeformer : public Deformer {
     // Only turns are cut into steps. A translation, however long, is tried at once from the linear
     // answer; where that inverts tets the way is walked from rest, in steps that are halved.
     run.step = std::min(1.0, kLargestTurn / std::max(path.LargestTurn(), kLargestTurn));
-    if (begin == Begin::kAtRest && !(run.step == 1.0 && StartFromLinear(&run))) {
-      search_.Start(Positions::Zero(rest().rows(), 3));
+    if (begin == Begin::kAtRest) {
+      TF_ASSIGN_OR_RETURN(const bool starts_at_end,
+                          run.step == 1.0 ? StartFromLinear(&run) : absl::StatusOr<bool>(false));
+      if (!starts_at_end) {
+        if (contact_ != nullptr) contact_->SetPoses(path.PosesAt(0));
+        search_.Start(Positions::Zero(rest().rows(), 3));
+      }
     }
     if (run.summary().load == 1.0) {
       TF_RETURN_IF_ERROR(Relax(&run));
     }
     while (run.summary().load < 1.0 && !IsBlocked(run) && MayGoOn(&run)) {
-      if (!Advance(&run)) {
+      TF_ASSIGN_OR_RETURN(const bool advanced, Advance(&run));
+      if (!advanced) {
         run.step *= 0.5;
         continue;
       }
@@ -191,16 +241,47 @@ class NeoHookeanDeformer : public Deformer {
   }
 
   // False when the linear answer to the whole load inverts tets.
-  bool StartFromLinear(Run* run) {
+  absl::StatusOr<bool> StartFromLinear(Run* run) {
     const std::vector<HandlePose> poses = run->path.PosesAt(1.0);
-    const Eigen::VectorXd linear = elastic_.response_columns() * elastic_.Coefficients(poses);
+    const Eigen::VectorXd coefficients = elastic_.Coefficients(poses);
+    Eigen::VectorXd linear = elastic_.response_columns() * coefficients;
+    std::vector<int32_t> closed;
+    if (contact_ != nullptr && !linear_contact_->rows().empty()) {
+      TF_RETURN_IF_ERROR(AddLinearContact(coefficients, &linear, &closed));
+    }
     Positions displacements = Eigen::Map<const Positions>(linear.data(), rest().rows(), 3);
     SetConstrained(poses, &displacements);
-    if (!search_.Start(std::move(displacements))) {
-      return false;
+    TF_ASSIGN_OR_RETURN(const bool starts,
+                        StartAt(poses, std::move(displacements), std::move(closed)));
+    if (starts) run->summary().load = 1.0;
+    return starts;
+  }
+
+  // To the linear answer; `closed` are the rows that touch in it.
+  absl::Status AddLinearContact(const Eigen::VectorXd& coefficients, Eigen::VectorXd* linear,
+                                std::vector<int32_t>* closed) const {
+    const Eigen::MatrixXd& C = linear_contact_->compliance();
+    const Eigen::VectorXd gaps = linear_contact_->Gaps(coefficients);
+    LcpSolver solver({C.data(), static_cast<size_t>(C.size())}, static_cast<size_t>(C.rows()));
+    const LcpSolution& solution = solver.Solve({gaps.data(), static_cast<size_t>(gaps.size())});
+    TF_ASSIGN_OR_RETURN(const Eigen::VectorXd pushed,
+                        linear_contact_->Displacements(solution.multipliers));
+    *linear += pushed;
+    *closed = solution.active;
+    return absl::OkStatus();
+  }
+
+  // Starts the search from displacements that meet the rows of contact at the poses; false when
+  // that inverts tets.
+  absl::StatusOr<bool> StartAt(absl::Span<const HandlePose> poses, Positions displacements,
+                               std::vector<int32_t> closed) {
+    if (contact_ != nullptr) {
+      contact_->SetPoses(poses);
+      TF_RETURN_IF_ERROR(contact_->Close(std::move(closed)));
+      TF_ASSIGN_OR_RETURN(const Positions correction, contact_->Correction(displacements));
+      displacements += correction;
     }
-    run->summary().load = 1.0;
-    return true;
+    return search_.Start(std::move(displacements));
   }
 
   static bool IsBlocked(const Run& run) { return run.step < kSmallestLoadStep; }
@@ -228,16 +309,22 @@ class NeoHookeanDeformer : public Deformer {
 
   // Carries the state on by a load step; false when that inverts tets. Newton steps go on where
   // L-BFGS got stuck, also to where a handle has passed through a region as a whole: not so far.
-  bool Advance(Run* run) {
+  absl::StatusOr<bool> Advance(Run* run) {
     const double end = EndOfStep(*run);
     if (run->summary().newton_steps > 0 && Crossing(*run, end).has_value()) {
       return false;
     }
-    if (!search_.Start(Carried(*run, end))) {
-      return false;
+    const std::vector<int32_t> closed =
+        contact_ != nullptr ? contact_->closed() : std::vector<int32_t>();
+    TF_ASSIGN_OR_RETURN(const bool starts,
+                        StartAt(run->path.PosesAt(end), Carried(*run, end), closed));
+    if (starts) {
+      run->summary().load = end;
+    } else if (contact_ != nullptr) {
+      contact_->SetPoses(run->path.PosesAt(run->summary().load));
+      TF_RETURN_IF_ERROR(contact_->Close(closed));
     }
-    run->summary().load = end;
-    return true;
+    return starts;
   }
 
   void SetConstrained(const std::vector<HandlePose>& poses, Positions* displacements) const {
@@ -251,14 +338,86 @@ class NeoHookeanDeformer : public Deformer {
     return !run->summary().cancelled && run->summary().iterations < options_.max_iterations;
   }
 
-  // Towards the equilibrium at the load reached.
+  // Towards the equilibrium at the load reached. Rows of contact are exchanged where it is nearly
+  // found, as often as it takes, and only then it is looked for to the last.
   absl::Status Relax(Run* run) {
     SolveSummary& summary = run->summary();
     const double tolerance = summary.load == 1.0 ? options_.tolerance : kStepTolerance;
+    bool is_settled = contact_ == nullptr;
+    if (contact_ != nullptr) {
+      ExchangeRun exchanges;
+      TF_RETURN_IF_ERROR(
+          RelaxWithRows(run, std::max(tolerance, kStepTolerance), &exchanges).status());
+      TF_ASSIGN_OR_RETURN(is_settled, RelaxWithRows(run, tolerance, &exchanges));
+    } else {
+      TF_RETURN_IF_ERROR(RelaxTo(run, tolerance));
+    }
+    summary.converged =
+        is_settled && summary.load == 1.0 && search_.residual() <= options_.tolerance;
+    return absl::OkStatus();
+  }
+
+  // True when no more row is to be exchanged.
+  absl::StatusOr<bool> RelaxWithRows(Run* run, double tolerance, ExchangeRun* exchanges) {
+    while (exchanges->left-- > 0) {
+      TF_RETURN_IF_ERROR(RelaxTo(run, tolerance));
+      if (search_.residual() > tolerance) return false;
+      const std::vector<int32_t> violations = Violations();
+      const bool meets_rows = contact_->Miss(search_.displacements()) <= kLargestMiss;
+      if (violations.empty() && meets_rows) return true;
+      if (!MayGoOn(run)) return false;
+      TF_ASSIGN_OR_RETURN(const bool exchanged,
+                          Exchange(violations, exchanges->MayExchangeAll(violations.size() +
+                                                                         (meets_rows ? 0 : 1))));
+      if (!exchanged) return false;
+    }
+    return false;
+  }
+
+  ContactState StateOfContact() const {
+    return {search_.ContactForces(), contact_->Gaps(search_.displacements())};
+  }
+
+  // Rows that penetrate though they are open, or pull though they are closed.
+  std::vector<int32_t> Violations() const {
+    const ContactState state = StateOfContact();
+    const Eigen::MatrixXd& C = linear_contact_->compliance();
+    std::vector<int32_t> violations;
+    for (Eigen::Index row = 0; row < state.gaps.size(); ++row) {
+      const bool is_closed =
+          std::ranges::binary_search(contact_->closed(), static_cast<int32_t>(row));
+      const double miss_mm = is_closed ? C(row, row) * state.forces[row] : state.gaps[row];
+      if (miss_mm < -kLargestPenetration) violations.push_back(static_cast<int32_t>(row));
+    }
+    return violations;
+  }
+
+  // Opens closed rows and closes open ones: all, or the last alone. Where meeting them at once
+  // inverts tets a part of the way is gone. False, and nothing is changed, when no part can be.
+  absl::StatusOr<bool> Exchange(const std::vector<int32_t>& rows, bool all) {
+    const std::vector<int32_t> before = contact_->closed();
+    const std::vector<int32_t> chosen(all || rows.empty() ? rows.begin() : rows.end() - 1,
+                                      rows.end());
+    std::vector<int32_t> closed;
+    std::ranges::set_symmetric_difference(before, chosen, std::back_inserter(closed));
+    TF_RETURN_IF_ERROR(contact_->Close(std::move(closed)));
+    const Positions displacements = search_.displacements();
+    TF_ASSIGN_OR_RETURN(const Positions correction, contact_->Correction(displacements));
+    for (double part = 1; part >= kSmallestCorrection; part *= 0.5) {
+      if (search_.Start(displacements + part * correction)) return true;
+    }
+    TF_RETURN_IF_ERROR(contact_->Close(before));
+    return false;
+  }
+
+  // With the rows of contact that are met now.
+  absl::Status RelaxTo(Run* run, double tolerance) {
+    SolveSummary& summary = run->summary();
     newton_.Restart();
     bool next_is_newton = false;
     while (search_.residual() > tolerance && MayGoOn(run) && Report(run)) {
-      const bool is_newton = next_is_newton || newton_.Consider(summary.iterations);
+      const bool is_newton =
+          next_is_newton || (contact_ == nullptr && newton_.Consider(summary.iterations));
       summary.newton_steps += is_newton ? 1 : 0;
       TF_ASSIGN_OR_RETURN(const double change, search_.Step());
       ++summary.iterations;
@@ -266,12 +425,11 @@ class NeoHookeanDeformer : public Deformer {
       summary.energies_nj.push_back(search_.value().energy_nj);
       // Where a step gets nowhere, Newton's may; where that does not, the search can do no more,
       // and the residual says below whether that is enough.
-      next_is_newton = change == 0 && !is_newton && newton_.Take();
+      next_is_newton = change == 0 && !is_newton && contact_ == nullptr && newton_.Take();
       if (change == 0 && !next_is_newton) {
         break;
       }
     }
-    summary.converged = summary.load == 1.0 && search_.residual() <= options_.tolerance;
     return absl::OkStatus();
   }
 
@@ -292,6 +450,18 @@ class NeoHookeanDeformer : public Deformer {
     run->deformation.positions = rest() + search_.displacements();
     run->deformation.positions(constraints.constrained(), Eigen::all) =
         ConstrainedPositions(rest(), constraints, run->path.PosesAt(run->summary().load));
+    if (contact_ != nullptr) DescribeContact(&run->deformation.contact);
+  }
+
+  void DescribeContact(ContactAnswer* answer) const {
+    const ContactState state = StateOfContact();
+    if (state.gaps.size() == 0) return;
+    const Eigen::VectorXd pressed = state.forces.cwiseMax(0.0);
+    answer->forces.assign(pressed.begin(), pressed.end());
+    answer->gaps_mm.assign(state.gaps.begin(), state.gaps.end());
+    answer->residual_mm =
+        state.gaps.cwiseMin(linear_contact_->compliance().diagonal().cwiseProduct(state.forces))
+            .lpNorm<Eigen::Infinity>();
   }
 
   void Finish(Run* run) {
@@ -339,12 +509,14 @@ class NeoHookeanDeformer : public Deformer {
   // Constant after the constructor.
   const std::shared_ptr<MeshPreparation> preparation_;  // owns elastic_
   const ElasticSystem& elastic_;
+  const ElasticContact* const linear_contact_;  // null without contact
   const NeoHookeanOptions options_;
   const Eigen::MatrixXd shares_;  // #V by #handles
   PreparationSummary summary_;
 
   // The state of the last answer; its poses when it had reached them, else none.
   NeoHookeanEnergy energy_;
+  const std::unique_ptr<TurningContact> contact_;  // null without contact
   EquilibriumSearch search_;
   NewtonFallback newton_;
   std::vector<HandlePose> last_poses_;
@@ -365,7 +537,14 @@ absl::StatusOr<std::unique_ptr<Deformer>> CreateNeoHookeanDeformer(
   if (UsesRoundedFactor(*elastic)) {
     TF_ASSIGN_OR_RETURN(rounded, elastic->Rounded(preparation->options().admission));
   }
-  return std::make_unique<NeoHookeanDeformer>(std::move(preparation), *elastic, rounded, options);
+  const ElasticContact* linear_contact = nullptr;
+  std::unique_ptr<TurningContact> contact;
+  if (!preparation->constraints().contact().empty()) {
+    TF_ASSIGN_OR_RETURN(linear_contact, preparation->Contact(cancellation));
+    TF_ASSIGN_OR_RETURN(contact, TurningContact::Create(*preparation, *elastic, *linear_contact));
+  }
+  return std::make_unique<NeoHookeanDeformer>(std::move(preparation), *elastic, rounded,
+                                              linear_contact, std::move(contact), options);
 }
 
 }  // namespace tissueform

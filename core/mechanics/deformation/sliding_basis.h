@@ -31,6 +31,12 @@ class SlidingBasis {
   const std::vector<Held>& held() const { return held_; }  // by unknown, rising
   bool empty() const { return held_.empty(); }
 
+  struct TurnedVertex {
+    int32_t vertex = 0;
+    Eigen::Matrix3d axes;  // in its columns
+  };
+  const std::vector<TurnedVertex>& vertices() const { return vertices_; }  // rising
+
   // Q^T K Q, where Q x are the unknowns along x, y and z of turned unknowns x. `K` is 3 #V square.
   SparseMatrix Turn(const SparseMatrix& K) const;
   // Q^T x and Q x, 3 #V by k, in place.
@@ -38,13 +44,8 @@ class SlidingBasis {
   void FromTurned(Eigen::MatrixXd* x) const;
 
  private:
-  struct TurnedVertex {
-    int32_t vertex = 0;
-    Eigen::Matrix3d axes;  // in its columns
-  };
-
   const Eigen::Index num_unknowns_;
-  std::vector<TurnedVertex> vertices_;  // rising
+  std::vector<TurnedVertex> vertices_;
   std::vector<Held> held_;
 };
 

@@ -91,6 +91,8 @@ class DirichletSystem {
   // x solves it.
   double RelativeResidual(const Eigen::MatrixXd& rhs, const Eigen::MatrixXd& solution) const;
 
+  Eigen::Index num_unknowns() const { return size_; }
+  Eigen::Index num_prescribed() const { return static_cast<Eigen::Index>(prescribed_.size()); }
   Eigen::Index num_free() const { return static_cast<Eigen::Index>(free_.size()); }
   const std::vector<int32_t>& free() const { return free_; }
   const FactorizationSummary& factorization() const { return factorization_; }

@@ -3,6 +3,8 @@
 
 #include "core/mechanics/prepared_answers/create_response.h"
 
+#include "absl/strings/str_cat.h"
+
 #include "core/base/status_macros.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/prepared_answers/linear_elastic_response.h"
@@ -15,8 +17,9 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const ResponseOptions& options, const Cancellation& cancellation) {
   const ModelTraits& model = TraitsOf(options.model);
-  if (!model.has_contact) {
-    TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), model.name));
+  if (!model.has_prepared_contact) {
+    TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(),
+                                           absl::StrCat(model.name, " in prepared answers")));
   }
   if (options.model == DeformationModel::kLinearElastic) {
     return CreateLinearElasticResponse(preparation, vertices,

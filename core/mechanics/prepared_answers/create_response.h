@@ -32,7 +32,8 @@ struct ResponseOptions {
 
 // The one switch over prepared answers. REQUIRES: HasPreparedAnswers.
 //
-// Errors: those of CreateResponseBasis, CreateLinearElasticResponse, CreateNeoHookeanResponse.
+// Errors: those of CreateResponseBasis, CreateLinearElasticResponse, CreateNeoHookeanResponse;
+// InvalidArgument where there are contact rows and the model has none in prepared answers.
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const ResponseOptions& options, const Cancellation& cancellation = {});

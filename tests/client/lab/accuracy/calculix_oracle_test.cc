@@ -208,6 +208,98 @@ TEST_F(CalculixOracleTest, LinearElasticityWithContactIsCalculixsOfTwoSurfaces) 
   EXPECT_NEAR(force, expected.z(), 1e-3 * expected.z());
 }
 
+// A block of 3 x 3 x 3.75 mm under a plate that presses, turns and slides by 2 mm in all. The plate
+// is wider, so that the block stays under it; as a handle it is rigid.
+constexpr double kTop = 3.75;  // mm
+
+AccuracyCase BlockUnderATurningPlate() {
+  const TetMesh block = testing::Bar({4, 4, 5}, 0.75);
+  const TetMesh plate = testing::Bar({9, 9, 2}, 0.75);
+  const auto vertices = static_cast<int32_t>(block.num_vertices());
+  Positions positions(vertices + plate.num_vertices(), 3);
+  positions << block.positions(),
+      plate.positions().rowwise() + Eigen::RowVector3d(-1.875, -1.875, kTop);
+  TetIndices tets(block.num_tets() + plate.num_tets(), 4);
+  tets << block.tets(), (plate.tets().array() + vertices).matrix();
+  const TetMesh mesh = *TetMesh::Create(positions, tets);
+  std::vector<ContactRow> rows;
+  std::vector<int32_t> bottom;
+  for (int32_t v = 0; v < vertices; ++v) {
+    if (positions(v, 2) == 0) bottom.push_back(v);
+    if (positions(v, 2) == kTop) {
+      rows.push_back({.vertex = v, .handle = 0, .normal = -Eigen::Vector3d::UnitZ()});
+    }
+  }
+  std::vector<int32_t> of_plate(static_cast<size_t>(plate.num_vertices()));
+  std::iota(of_plate.begin(), of_plate.end(), vertices);
+  HandlePose pose;
+  pose.rotation_vector = {0.2, -0.15, 0};
+  pose.pivot_mm = {1.5, 1.5, kTop};
+  pose.translation_mm = {0.7, 0.5, -0.45};
+  return {"block_under_plate",
+          "",
+          mesh,
+          Eigen::VectorXd::Constant(mesh.num_tets(), 15000),
+          ConstraintSet::Create(mesh, bottom, {{"plate", of_plate}}, rows).value(),
+          {pose},
+          {}};
+}
+
+// The same with a plate of tissue so stiff that it keeps its shape, moved by its upper face, and
+// with the vertices of both faces in rows, from which CalculiX takes its surfaces.
+CalculixProblem OfTwoSurfaces(const AccuracyCase& problem) {
+  const TetMesh& mesh = problem.mesh;
+  const std::vector<int32_t>& plate = problem.constraints.handles()[0].vertices;
+  std::vector<int32_t> upper;
+  std::vector<int32_t> moved;
+  for (const int32_t v : plate) {
+    if (mesh.positions()(v, 2) == kTop) upper.push_back(v);
+    if (mesh.positions()(v, 2) == kTop + 1.5) moved.push_back(v);
+  }
+  std::vector<ContactRow> rows;
+  for (size_t i = 0; i < upper.size(); ++i) {
+    const size_t like = i % problem.constraints.contact().size();
+    rows.push_back({.vertex = upper[i],
+                    .other = problem.constraints.contact()[like].vertex,
+                    .normal = Eigen::Vector3d::UnitZ()});
+  }
+  Eigen::VectorXd stiffness = problem.stiffness;
+  for (Eigen::Index t = 0; t < mesh.num_tets(); ++t) {
+    if (mesh.tets().row(t).minCoeff() >= plate.front()) stiffness[t] *= 1e3;
+  }
+  const auto constraints =
+      ConstraintSet::Create(mesh, problem.constraints.fixed(), {{"plate", moved}}, rows).value();
+  return {mesh,
+          stiffness,
+          0.3,
+          constraints,
+          ConstrainedDisplacements(mesh, constraints, problem.poses),
+          CalculixLaw::kNeoHookean,
+          /*forces_and_stresses=*/true,
+          BoneMotions(mesh, constraints, problem.poses),
+          CalculixContact::kSurfaces};
+}
+
+// CalculiX's normals turn with its surfaces, ours with the bone.
+TEST_F(CalculixOracleTest, NeoHookeanUnderATurningBoneIsCalculixsOfTwoSurfaces) {
+  const AccuracyCase problem = BlockUnderATurningPlate();
+  EXPECT_NEAR(LargestMove(problem), 2, 0.1);
+  ASSERT_OK_AND_ASSIGN(const CalculixResult reference,
+                       RunCalculix(OfTwoSurfaces(problem), folder()));
+  ASSERT_OK_AND_ASSIGN(const Deformation answer,
+                       DeformationOf(problem, DeformationModel::kNeoHookean, 0.3));
+  const auto open = std::ranges::count(answer.contact.forces, 0.0);
+  EXPECT_GT(open, 2);
+  EXPECT_LT(open, 20) << "of 25";
+  const double distance = (answer.positions - reference.deformed).rowwise().norm().maxCoeff();
+  EXPECT_LT(distance, 0.03 * LargestMove(problem));
+  const Eigen::RowVector3d expected =
+      reference.forces(problem.constraints.fixed(), Eigen::all).colwise().sum();
+  const double force =
+      std::accumulate(answer.contact.forces.begin(), answer.contact.forces.end(), 0.0);
+  EXPECT_NEAR(force, expected.norm(), 0.03 * expected.norm());
+}
+
 // CalculiX prints seven digits: up to 5e-7 mm for each coordinate of a move of some millimetres.
 TEST_F(CalculixOracleTest, LinearElasticityEqualsCalculixOnTheLayeredBlock) {
   for (const double poisson_ratio : {0.0, 0.3, 0.45}) {
