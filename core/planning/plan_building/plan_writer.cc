@@ -92,6 +92,20 @@ std::string PlanJson(const PlanBuild& build) {
   return plan.dump(2) + "\n";
 }
 
+PlannedContactRow Planned(const ContactRow& row, const std::vector<BuiltSegment>& segments) {
+  PlannedContactRow planned{.vertex = row.vertex,
+                            .other = {},
+                            .normal = row.normal,
+                            .gap_mm = row.gap_mm,
+                            .bilateral = row.bilateral};
+  if (row.other != ContactRow::kBone) {
+    planned.other = int64_t{row.other};
+  } else if (row.handle != ContactRow::kFixedBone) {
+    planned.other = segments[static_cast<size_t>(row.handle)].cut.name;
+  }
+  return planned;
+}
+
 VertexSelector SelectLabel(size_t label) {
   return {SelectByPointData{kAnatomyArray, static_cast<double>(label)}};
 }
@@ -109,6 +123,11 @@ Plan PlanOf(const PlanBuild& build) {
     plan.handles.push_back({.name = build.segments[s].cut.name,
                             .region = SelectLabel(kFirstSegment + s),
                             .pose = PoseFromJson(ToJson(build.segments[s].pose))});
+  }
+  if (build.lips) {
+    for (const ContactRow& row : build.lips->rows) {
+      plan.contact.push_back(Planned(row, build.segments));
+    }
   }
   plan.model = build.recipe.model;
   if (const auto factors = FactorsOf(build.recipe.tissues)) {
