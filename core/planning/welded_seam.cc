@@ -50,8 +50,8 @@ absl::StatusOr<int32_t> NumKept(const std::vector<int32_t>& first) {
     if (first[static_cast<size_t>(vertex)] == vertex) continue;
     return absl::InvalidArgumentError(absl::StrCat(
         "the lips cannot be joined: vertex ", vertex, " doubles vertex ",
-        first[static_cast<size_t>(vertex)], " and is not among the last vertices (vertex ", kept - 1,
-        " is not a double); number the seam's doubles last, or keep contact on"));
+        first[static_cast<size_t>(vertex)], " and is not among the last vertices (vertex ",
+        kept - 1, " is not a double); number the seam's doubles last, or keep contact on"));
   }
   return kept;
 }
@@ -63,9 +63,9 @@ absl::StatusOr<TetIndices> WeldTets(const TetIndices& tets, const std::vector<in
       welded(t, corner) = first[static_cast<size_t>(tets(t, corner))];
       for (int before = 0; before < corner; ++before) {
         if (welded(t, before) != welded(t, corner)) continue;
-        return absl::InvalidArgumentError(absl::StrCat(
-            "the lips cannot be joined: tet ", t, " has vertices ", tets(t, before), " and ",
-            tets(t, corner), ", which are at one place; keep contact on"));
+        return absl::InvalidArgumentError(
+            absl::StrCat("the lips cannot be joined: tet ", t, " has vertices ", tets(t, before),
+                         " and ", tets(t, corner), ", which are at one place; keep contact on"));
       }
     }
   }

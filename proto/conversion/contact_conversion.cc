@@ -69,9 +69,8 @@ ContactRowProtos ToProto(const std::vector<ContactRow>& rows,
 absl::StatusOr<std::vector<ContactRow>> ToContactRows(const ContactRowProtos& protos,
                                                       const std::vector<HandleRegion>& handles) {
   if (protos.size() > static_cast<int>(kMaxContactRows)) {
-    return absl::InvalidArgumentError(absl::StrCat("the request has ", protos.size(),
-                                                   " contact rows; send ", kMaxContactRows,
-                                                   " at most"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the request has ", protos.size(), " contact rows; send ", kMaxContactRows, " at most"));
   }
   std::vector<ContactRow> rows;
   for (int number = 0; number < protos.size(); ++number) {

@@ -14,6 +14,7 @@
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/problem/contact_summary.h"
 #include "proto/conversion/contact_conversion.h"
+#include "proto/conversion/material_conversion.h"
 #include "proto/conversion/session_conversion.h"
 #include "tests/integration/durable_server.h"
 #include "tests/integration/service_test.h"
@@ -34,7 +35,8 @@ class ContactSessionsTest : public ServiceTest {
   static std::vector<HandlePose> Poses() {
     std::vector<HandlePose> poses(6);
     for (size_t i = 0; i < poses.size(); ++i) {
-      poses[i].translation_mm = {0.05, -0.1, (i % 2 == 0 ? -0.1 : 0.1) * static_cast<double>(i + 1)};
+      poses[i].translation_mm = {0.05, -0.1,
+                                 (i % 2 == 0 ? -0.1 : 0.1) * static_cast<double>(i + 1)};
       poses[i].rotation_vector.x() = 0.02 * static_cast<double>(i % 3);
     }
     return poses;
@@ -196,6 +198,36 @@ TEST_F(ContactSessionsTest, SessionsWithAndWithoutRowsShareNothing) {
   const HandlePose pose = Poses()[4];
   EXPECT_EQ(Answer(client.get(), one, pose), Float32Bytes(Solve(touching, pose).positions));
   EXPECT_EQ(Answer(client.get(), other, pose), Float32Bytes(Solve(sticking, pose).positions));
+}
+
+TEST_F(ContactSessionsTest, PredictionsTellRecipesWithOtherRowsApart) {
+  const auto client = Connect();
+  std::vector<std::string> recipes;
+  for (const auto& rows : {block_.rows, std::vector<ContactRow>{}, block_.rows}) {
+    const v1::Session session = MakeContactSession(client.get(), Problem(rows));
+    ASSERT_OK_AND_ASSIGN(const v1::Prediction prediction,
+                         client->predictions().Create(session.name(), TopPose(Poses()[2])));
+    EXPECT_EQ(prediction.summary().has_contact(), !rows.empty());
+    recipes.push_back(prediction.recipe_sha256());
+  }
+  EXPECT_NE(recipes[0], recipes[1]);
+  EXPECT_EQ(recipes[0], recipes[2]);
+}
+
+TEST_F(ContactSessionsTest, ABandOfUncertaintyIsRefusedAndNotAskedForByPlans) {
+  const auto client = Connect();
+  PlanProblem problem = Problem(block_.rows);
+  MaterialUncertainty& ranges = problem.uncertainty.emplace();
+  ranges.tissues = {{"one", 2}, {"other", 1.5}};
+  ranges.tissue_of_tet.assign(static_cast<size_t>(block_.mesh.num_tets()), 0);
+  ranges.tissue_of_tet.back() = 1;
+  const v1::Session session = MakeContactSession(client.get(), problem);
+  DeformStream::Options options;
+  *options.prepared.emplace().mutable_ranges() = ToProto(ranges);
+  EXPECT_THAT(client->OpenStream(session.name(), options),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("band of uncertainty")));
+  options.prepared = PreparedAnswersOf(problem);
+  EXPECT_THAT(client->OpenStream(session.name(), options), IsOk());
 }
 
 TEST_F(ContactSessionsTest, BadRowsAreRefusedByTheirIndex) {

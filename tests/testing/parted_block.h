@@ -24,8 +24,8 @@ class PartedBlock {
     Positions positions = mesh.positions();
     TetIndices tets = mesh.tets();
     const auto whole = static_cast<int32_t>(positions.rows());
-    const std::vector<int32_t> lower = SelectVertices(
-        mesh, [](const Eigen::Vector3d& v) { return v.z() == 2 && v.y() >= 1; });
+    const std::vector<int32_t> lower =
+        SelectVertices(mesh, [](const Eigen::Vector3d& v) { return v.z() == 2 && v.y() >= 1; });
     positions.conservativeResize(whole + static_cast<int32_t>(lower.size()), 3);
     for (size_t i = 0; i < lower.size(); ++i) {
       const int32_t upper = whole + static_cast<int32_t>(i);

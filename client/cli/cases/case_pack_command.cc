@@ -81,7 +81,7 @@ void AddCasePackCommand(CLI::App& command, CommandWork* work) {
   pack->add_option("--out", options->out, "the case to write, NAME.tfcase")->required();
   pack->add_option("--title", options->title, "name shown by the planner (default: the segments)");
   pack->add_flag("--overwrite", options->overwrite, "replace an existing file");
-  AddAllowOutside(pack, &options->reading);
+  AddPlanOptions(pack, &options->reading);
   pack->footer(kCasePackFooter);
   pack->callback([options, work] { *work = [options] { return PackCase(*options); }; });
 }

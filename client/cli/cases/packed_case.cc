@@ -60,7 +60,7 @@ absl::StatusOr<OpenedPlan> OpenPlan(const std::string& plan_path, const PlanRead
                                     const std::string& title) {
   TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(plan_path, "plan", kMaxPlanBytes));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(plan_path, reading));
-  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan, reading.resolve));
   TF_ASSIGN_OR_RETURN(std::optional<ViewerFile> viewer, FindViewer(plan.mesh_path));
   CaseFile about;
   about.title = title;

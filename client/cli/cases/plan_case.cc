@@ -95,7 +95,7 @@ std::vector<CaseSurface> FollowingSurfaces(const PlanProblem& problem,
     }
     if (surface.kind != SurfaceKind::kSkin) continue;
     surface.follows =
-        FollowSkin(surface.positions, surface.triangles, *problem.mesh, problem.constraints);
+        FollowSkin(surface.positions, surface.triangles, *problem.mesh, StickingRegions(problem));
     surface.regions = RegionsOfFollowers(*surface.follows, regions);
   }
   return surfaces;
@@ -111,16 +111,29 @@ std::vector<CaseLandmark> KnownLandmarks(const PlanProblem& problem,
 
 absl::StatusOr<std::vector<CaseSurface>> SurfacesOfMesh(const PlanProblem& problem,
                                                         const std::vector<uint8_t>& regions) {
-  std::optional<CaseSurface> skin = SkinOfMesh(*problem.mesh, problem.constraints, regions);
+  const ConstraintSet sticking = StickingRegions(problem);
+  std::optional<CaseSurface> skin = SkinOfMesh(*problem.mesh, sticking, regions);
   if (!skin) {
     return absl::InvalidArgumentError(
         "every vertex of the mesh is fixed or moved: there is no skin to show");
   }
   std::vector<CaseSurface> surfaces = {*std::move(skin)};
-  for (CaseSurface& segment : SegmentsOfMesh(*problem.mesh, problem.constraints)) {
+  for (CaseSurface& segment : SegmentsOfMesh(*problem.mesh, sticking)) {
     surfaces.push_back(std::move(segment));
   }
   return surfaces;
+}
+
+std::optional<CaseContact> ContactOf(const PlanProblem& problem) {
+  if (problem.constraints.contact().empty()) return std::nullopt;
+  CaseContact contact{.rows = static_cast<int64_t>(problem.constraints.contact().size()),
+                      .sticking = {}};
+  contact.sticking.resize(static_cast<Eigen::Index>(problem.freed.size()), 2);
+  for (size_t i = 0; i < problem.freed.size(); ++i) {
+    contact.sticking.row(static_cast<Eigen::Index>(i)) << problem.freed[i].vertex,
+        problem.freed[i].region;
+  }
+  return contact;
 }
 
 CaseMesh MeshOf(const PlanProblem& problem) {
@@ -157,6 +170,7 @@ absl::StatusOr<CaseFile> CaseOfPlan(const PlanProblem& problem, CaseFile about,
   about.mesh = MeshOf(problem);
   about.session_request = ToProto(SessionRequestOf(problem, about.mesh.name)).SerializeAsString();
   about.model = ModelName(problem.deformer.model);
+  about.contact = ContactOf(problem);
   if (problem.uncertainty) {
     about.material_ranges = ToProto(*problem.uncertainty).SerializeAsString();
   }

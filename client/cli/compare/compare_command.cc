@@ -49,7 +49,8 @@ void CheckUse(const CLI::App& command, const CompareOptions& options) {
   if (options.b.empty()) {
     throw CLI::ValidationError("B", "is required: two results, or one plan (.json)");
   }
-  for (const char* option : {"--models", "--reference", "--solver-threads", "--allow-outside"}) {
+  for (const char* option :
+       {"--models", "--reference", "--solver-threads", "--allow-outside", "--contact"}) {
     refuse(option, "applies to a plan (.json)");
   }
   if (!options.out.empty() && !EndsWith(options.out, ".vtu")) {
@@ -72,7 +73,7 @@ void AddModelOptions(CLI::App* command, CompareOptions* options) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   AddSolverThreads(command, "for a plan: ", &options->solver_threads);
-  AddAllowOutside(command, &options->reading);
+  AddPlanOptions(command, &options->reading);
 }
 
 }  // namespace

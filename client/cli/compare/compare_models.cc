@@ -148,7 +148,7 @@ absl::Status MeasureDistances(const CompareOptions& options, ModelComparison* co
 absl::StatusOr<ModelComparison> RunModels(const CompareOptions& options,
                                           const std::vector<std::string>& models) {
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.a, options.reading));
-  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan, options.reading.resolve));
   problem.deformer.preparation.threads = options.threads;
   TF_ASSIGN_OR_RETURN(const auto preparation,
                       MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,

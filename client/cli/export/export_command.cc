@@ -120,7 +120,7 @@ void AddExportCommand(CLI::App& app, CommandWork* work) {
       "--title", options->face.title,
       "heading above the picture (default: none, because it could name the patient)");
   command->add_flag("--overwrite", options->overwrite, "replace an existing file");
-  AddAllowOutside(command, &options->reading);
+  AddPlanOptions(command, &options->reading);
   command->footer(kExportFooter);
   command->callback([options, work] { *work = [options] { return Export(*options); }; });
 }

@@ -58,7 +58,8 @@ absl::StatusOr<PortableAnswers> PrepareAnswers(const PlanProblem& problem, Defor
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<VertexResponse> response,
                       CreateResponse(preparation, vertices, {.model = model}));
   PortableAnswers answers = response->Describe();
-  if (problem.uncertainty && TraitsOf(model).is_elastic) {
+  // The band is not known with contact.
+  if (problem.uncertainty && TraitsOf(model).is_elastic && problem.constraints.contact().empty()) {
     TF_ASSIGN_OR_RETURN(const std::unique_ptr<BandColumns> band,
                         BandColumns::Create(preparation, *problem.uncertainty, vertices, nullptr));
     band->Describe(&answers);

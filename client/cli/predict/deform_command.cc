@@ -45,10 +45,11 @@ absl::StatusOr<Plan> ReadChosenPlan(const DeformOptions& options) {
   return plan;
 }
 
-absl::StatusOr<PlanProblem> ResolveWithProgress(const Plan& plan, double* seconds) {
+absl::StatusOr<PlanProblem> ResolveWithProgress(const Plan& plan, const ResolveOptions& options,
+                                                double* seconds) {
   const StageProgress progress("reading and checking the mesh");
   const Stopwatch stopwatch;
-  absl::StatusOr<PlanProblem> problem = ResolvePlan(plan);
+  absl::StatusOr<PlanProblem> problem = ResolvePlan(plan, options);
   *seconds = stopwatch.Seconds();
   if (problem.ok()) problem->deformer.gradient_field.compute_residual = true;
   return problem;
@@ -76,6 +77,7 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* s
   TF_ASSIGN_OR_RETURN(Deformation deformation, Solve(deformer.get(), problem.poses));
   stats->preparation = deformer->preparation();
   stats->solve = deformation.summary;
+  stats->contact = SummarizeContact(deformation.contact);
   stats->quality = MeasureDeformation(*problem.mesh, deformation.positions);
   stats->band = FindMaterialBandOrWarn(problem, deformation.positions, std::move(preparation));
   return std::move(deformation.positions);
@@ -85,7 +87,8 @@ absl::Status RunDeform(const DeformOptions& options) {
   TF_RETURN_IF_ERROR(CheckOutputs(options));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
   double read_seconds = 0;
-  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolveWithProgress(plan, &read_seconds));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem,
+                      ResolveWithProgress(plan, options.reading.resolve, &read_seconds));
   problem.deformer.preparation.threads = options.threads;
   problem.deformer.neo_hookean.newton_blas_threads = options.solver_threads;
   PredictionStats stats = StatsOf(problem);
@@ -122,11 +125,12 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   AddSolverThreads(command, "", &options->solver_threads);
-  AddAllowOutside(command, &options->reading);
+  AddPlanOptions(command, &options->reading);
   command->footer(
       "Examples:\n"
       "  tissueform deform plan.json --out after.vtu\n"
       "  tissueform deform plan.json --out after.vtu --model neo_hookean --stats stats.json\n"
+      "  tissueform deform plan.json --out sticking.vtu --contact off\n"
       "Open after.vtu in ParaView or 3D Slicer; displacement_mm is the movement of each vertex.\n"
       "Elastic models add stress, strain energy and reaction forces (docs/plan-format.md).");
   command->callback([options, work] { *work = [options] { return RunDeform(*options); }; });

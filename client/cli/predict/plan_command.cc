@@ -3,6 +3,7 @@
 
 #include "client/cli/predict/plan_command.h"
 
+#include <algorithm>
 #include <memory>
 #include <numbers>
 #include <string>
@@ -36,6 +37,16 @@ void PrintUncertainty(const MaterialUncertainty& uncertainty) {
   }
 }
 
+void PrintContact(const PlanProblem& problem) {
+  const std::vector<ContactRow>& rows = problem.constraints.contact();
+  if (problem.contact_use == ContactUse::kLeftOut) {
+    absl::PrintF("  contact    off: tissue sticks and the lips are one piece\n");
+  } else if (!rows.empty()) {
+    absl::PrintF("  contact    %d rows, of them %d bilateral\n", rows.size(),
+                 std::ranges::count_if(rows, &ContactRow::bilateral));
+  }
+}
+
 void PrintPlan(const std::string& path, const Plan& plan, const PlanProblem& problem) {
   absl::PrintF("plan   %s\n", path);
   absl::PrintF("  mesh       %s: %d vertices, %d tets, %s\n", plan.mesh_path,
@@ -53,6 +64,7 @@ void PrintPlan(const std::string& path, const Plan& plan, const PlanProblem& pro
     absl::PrintF("  handle     %s: %d vertices, %s\n", region.name, region.vertices.size(),
                  DescribePose(problem.poses[h]));
   }
+  PrintContact(problem);
   absl::PrintF("  model      %s, rotation %s\n", ModelName(plan.model),
                RotationModeName(plan.gradient_field.rotation));
   absl::PrintF("the plan is ready: tissueform deform %s --out after.vtu\n", path);
@@ -65,7 +77,7 @@ struct PlanCheckOptions {
 
 absl::Status RunPlanCheck(const PlanCheckOptions& options) {
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan, options.reading.resolve));
   PrintPlan(options.plan, plan, problem);
   return absl::OkStatus();
 }
@@ -83,7 +95,7 @@ CLI::App* AddPlanCommand(CLI::App& app, CommandWork* work) {
   auto options = std::make_shared<PlanCheckOptions>();
   CLI::App* check = plan->add_subcommand("check", "check a plan and its mesh, and summarize it");
   check->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
-  AddAllowOutside(check, &options->reading);
+  AddPlanOptions(check, &options->reading);
   check->footer(
       "Example:\n"
       "  tissueform plan check plan.json\n"

@@ -164,7 +164,7 @@ absl::Status RunPlanFit(const PlanFitOptions& options) {
     TF_ASSIGN_OR_RETURN(plan.model, ModelFromName(options.model));
   }
   TF_RETURN_IF_ERROR(CheckModel(plan));
-  TF_ASSIGN_OR_RETURN(PlanProblem resolved, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(PlanProblem resolved, ResolvePlan(plan, options.reading.resolve));
   resolved.deformer.preparation.threads = options.threads;
   TF_ASSIGN_OR_RETURN(const FitRequest request, ReadFitTargets(options.targets, resolved));
   absl::StatusOr<FitProblem> problem =
@@ -250,7 +250,7 @@ void AddPlanFitCommand(CLI::App& app, CommandWork* work) {
   fit->add_flag("--accept-misses", options->accept_misses,
                 "exit code 0 even if a target is not reached; the report still states it");
   fit->add_flag("--json", options->json, "print the report as JSON");
-  AddAllowOutside(fit, &options->reading);
+  AddPlanOptions(fit, &options->reading);
   fit->footer(kFooter);
   fit->callback([options, work] { *work = [options] { return RunPlanFit(*options); }; });
 }

@@ -88,7 +88,7 @@ absl::StatusOr<v1::Prediction> MakePrediction(const PredictionOptions& options,
     return client->predictions().Create(session, poses, model, "", options.Label());
   }
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan, options.reading.resolve));
   if (!options.session.empty()) {
     return client->predictions().Create(session, NamedPoses(problem), model, "", options.Label());
   }
@@ -278,7 +278,7 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
   AddModelOption(create, "use this model instead of the session's", &options->model);
   create->add_option("--title", options->title, "title in lists");
   create->add_option("--case", options->case_name, "the case that it belongs to");
-  AddAllowOutside(create, &options->reading);
+  AddPlanOptions(create, &options->reading);
 
   CLI::App* list = add("list", "all predictions", false, List);
   list->add_option("--session", options->session, "only predictions of this session");
@@ -308,7 +308,7 @@ void AddPredictionCommand(CLI::App& app, CommandWork* work) {
       ->type_name("FOLDER");
   CLI::Option* plan = save->add_option("--plan", options->plan, "the plan it was made from");
   save->add_option("--mesh", options->mesh, "the mesh file it was made from")->excludes(plan);
-  AddAllowOutside(save, &options->reading);
+  AddPlanOptions(save, &options->reading);
   add("delete", "delete one", true, Delete);
   AddPredictionSendCommands(*command, work);
   command->footer(

@@ -94,6 +94,7 @@ std::string RecipeSha256(const PlanProblem& problem) {
   recipe.poisson_ratio = whole.poisson_ratio;
   recipe.fixed = whole.fixed;
   recipe.handles = whole.handles;
+  recipe.contact = whole.contact;
   return RequestFingerprint(ToProto(recipe));
 }
 
@@ -104,11 +105,12 @@ absl::StatusOr<CaseFile> CaseOfMesh(const PlanProblem& problem) {
   contents.mesh.vertex_count = rest.rows();
   contents.mesh.payload.assign(reinterpret_cast<const char*>(rest.data()),
                                static_cast<size_t>(rest.size()) * sizeof(double));
-  std::optional<CaseSurface> skin = SkinOfMesh(*problem.mesh, problem.constraints, {});
+  const ConstraintSet sticking = StickingRegions(problem);
+  std::optional<CaseSurface> skin = SkinOfMesh(*problem.mesh, sticking, {});
   if (!skin)
     return absl::InvalidArgumentError(
         "every vertex of the mesh is fixed: there is no skin to show");
-  contents.surfaces = SegmentsOfMesh(*problem.mesh, problem.constraints);
+  contents.surfaces = SegmentsOfMesh(*problem.mesh, sticking);
   contents.surfaces.push_back(*std::move(skin));
   for (const HandleRegion& handle : problem.constraints.handles()) {
     contents.handles.push_back({.name = handle.name, .label = handle.name});
@@ -125,13 +127,14 @@ absl::Status WriteJson(const std::string& path, const OrderedJson& json) {
 absl::StatusOr<PredictionMesh> ReadPlanOf(const v1::Prediction& prediction, const std::string& path,
                                           const PlanReadOptions& reading) {
   TF_ASSIGN_OR_RETURN(Plan plan, ReadPlan(path, reading));
-  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan, reading.resolve));
   if (MeshNameOf(problem) != prediction.mesh()) return OtherMesh(prediction, path);
   if (problem.uncertainty && RecipeSha256(problem) != prediction.recipe_sha256()) {
-    absl::FPrintF(stderr,
-                  "warning: %s has other regions, stiffness or Poisson's ratio than when %s was "
-                  "made; its material uncertainty is omitted\n",
-                  path, prediction.name());
+    absl::FPrintF(
+        stderr,
+        "warning: %s has other regions, contact, stiffness or Poisson's ratio than when %s was "
+        "made; its material uncertainty is omitted\n",
+        path, prediction.name());
     problem.uncertainty.reset();
   }
   // Stresses are those of the model that has answered.
@@ -200,6 +203,12 @@ OrderedJson ProvenanceJson(const v1::Prediction& prediction) {
                    {"gave_up", TerminationName(ToSolveSummary(summary).gave_up)},
                    {"obstacle", summary.obstacle()},
                    {"second_factor_bytes", summary.second_factor_bytes()}};
+  if (summary.has_contact()) {
+    json["solve"]["contact"] = {{"unilateral_rows", summary.contact().row_count()},
+                                {"pressing_rows", summary.contact().pressing_row_count()},
+                                {"max_force_n", summary.contact().max_force_n()},
+                                {"residual_mm", summary.contact().residual_mm()}};
+  }
   const v1::DeformationQuality& quality = prediction.quality();
   json["quality"] = {{"inverted_tets", quality.inverted_tet_count()},
                      {"min_volume_ratio", quality.min_volume_ratio()},

@@ -19,6 +19,7 @@
 #include "client/cli/session/server_connection.h"
 #include "client/cli/session/session_wait.h"
 #include "client/cli/shared/companion.h"
+#include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/stats_json.h"
 #include "client/cli/shared/uncertainty_text.h"
 #include "client/cpp/plan_session.h"
@@ -37,6 +38,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 struct DragCommandOptions {
   std::string plan;
+  PlanReadOptions reading;
   ServerConnection server;
   double seconds = 20;
   double poses_per_second = 30;
@@ -230,8 +232,8 @@ absl::Status Run(const DragCommandOptions& options) {
   struct sigaction action = {};
   action.sa_handler = [](int) { interrupted = true; };
   sigaction(SIGINT, &action, nullptr);
-  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan));
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan, options.reading.resolve));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(options.server));
   return Drag(client.get(), problem, options);
 }
@@ -256,6 +258,7 @@ void AddDragCommand(CLI::App& app, CommandWork* work) {
       ->capture_default_str();
   command->add_flag("--local", options->local,
                     "fetch the prepared answers and also answer every pose locally");
+  AddPlanOptions(command, &options->reading);
   command->footer(
       "Example:\n"
       "  tissueform-server --port 50051 &\n"

@@ -20,6 +20,7 @@
 #include "core/base/stopwatch.h"
 #include "core/planning/plan_io.h"
 #include "proto/conversion/answer_conversion.h"
+#include "proto/conversion/contact_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -43,14 +44,18 @@ absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanP
                       client->DeformOnce(session->description().name(), NamedPoses(problem)));
   stats->preparation = ToPreparationSummary(session->description());
   stats->solve = ToSolveSummary(answer.summary());
+  if (answer.summary().has_contact()) {
+    stats->contact = ToContactSummary(answer.summary().contact());
+  }
   stats->quality = ToDeformationQuality(answer.quality());
   return DecodePositions(answer.positions(), problem.mesh->num_vertices());
 }
 
-absl::StatusOr<PlanProblem> ReadProblem(const Plan& plan, double* seconds) {
+absl::StatusOr<PlanProblem> ReadProblem(const Plan& plan, const ResolveOptions& options,
+                                        double* seconds) {
   const StageProgress progress("reading and checking the mesh");
   const Stopwatch stopwatch;
-  absl::StatusOr<PlanProblem> problem = ResolvePlan(plan);
+  absl::StatusOr<PlanProblem> problem = ResolvePlan(plan, options);
   *seconds = stopwatch.Seconds();
   return problem;
 }
@@ -60,7 +65,8 @@ absl::Status Run(const RunOptions& options) {
   if (!options.stats.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.stats));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
   double read_seconds = 0;
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ReadProblem(plan, &read_seconds));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem,
+                      ReadProblem(plan, options.reading.resolve, &read_seconds));
   PredictionStats stats = StatsOf(problem);
   stats.read_seconds = read_seconds;
   TF_ASSIGN_OR_RETURN(const Positions deformed, PredictOnServer(options, problem, &stats));
@@ -89,7 +95,7 @@ void AddRunCommand(CLI::App& app, CommandWork* work) {
       ->check(VtuEnding());
   command->add_option("--stats", options->stats,
                       "also write counts, times and quality to this JSON file");
-  AddAllowOutside(command, &options->reading);
+  AddPlanOptions(command, &options->reading);
   command->footer(
       "Example, in two terminals:\n"
       "  tissueform-server --port 50051\n"

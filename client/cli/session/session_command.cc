@@ -84,12 +84,13 @@ absl::Status CheckSameVertices(TissueformClient* client, const std::string& sess
 absl::Status SetRegions(const SessionOptions& options, TissueformClient* client,
                         v1::UpdateSessionRequest* request) {
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.regions, options.reading));
-  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan));
+  TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan, options.reading.resolve));
   TF_RETURN_IF_ERROR(CheckSameVertices(client, request->name(), problem));
   v1::CreateSessionRequest of_plan = ToProto(SessionRequestOf(problem, ""));
   v1::SessionRegions* regions = request->mutable_regions();
   *regions->mutable_fixed_vertices() = std::move(*of_plan.mutable_fixed_vertices());
   *regions->mutable_handles() = std::move(*of_plan.mutable_handles());
+  *regions->mutable_contact() = std::move(*of_plan.mutable_contact());
   return absl::OkStatus();
 }
 
@@ -132,11 +133,11 @@ void AddUpdateOptions(CLI::App* command, SessionOptions* options) {
   command->add_option("--poisson-ratio", options->poisson_ratio, "of the elastic models");
   command
       ->add_option("--regions", options->regions,
-                   "a plan of the same mesh whose fixed vertices and handles replace "
-                   "all regions. If its handles have the same names "
+                   "a plan of the same mesh whose fixed vertices, handles and contact rows "
+                   "replace all of the session's. If its handles have the same names "
                    "in the same order, open drags continue")
       ->type_name("PLAN");
-  AddAllowOutside(command, &options->reading);
+  AddPlanOptions(command, &options->reading);
   command->add_option("--etag", options->etag,
                       "only if the session still has this etag (see session show)");
 }

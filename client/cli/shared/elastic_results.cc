@@ -4,6 +4,7 @@
 #include "client/cli/shared/elastic_results.h"
 
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "core/base/percentiles.h"
@@ -36,11 +37,22 @@ Attribute ArrayOf(const char* name, int components, const Values& values) {
   return {name, components, std::vector<Number>(values.data(), values.data() + values.size())};
 }
 
+// Those that contact rows name, rising: there the force is that of bone or of the other lip.
+std::vector<int32_t> TouchingVertices(const PlanProblem& problem) {
+  std::set<int32_t> vertices;
+  for (const ContactRow& row : problem.constraints.contact()) {
+    vertices.insert(row.vertex);
+    if (row.other != ContactRow::kBone) vertices.insert(row.other);
+  }
+  return {vertices.begin(), vertices.end()};
+}
+
 Attribute ReactionArray(const PlanProblem& problem, const ElasticState& state) {
   Positions reactions = Positions::Zero(state.forces_n.rows(), 3);
   for (const int32_t v : problem.constraints.constrained()) {
     reactions.row(v) = state.forces_n.row(v);
   }
+  for (const int32_t v : TouchingVertices(problem)) reactions.row(v) = state.forces_n.row(v);
   SwapToOrFromLps(problem.written_in, &reactions);
   return ArrayOf<double>(kReactionForceArray, 3, reactions);
 }
@@ -106,6 +118,9 @@ std::optional<ElasticSummary> SummarizeElastic(const PlanProblem& problem,
   for (const HandleRegion& handle : problem.constraints.handles()) {
     summary.handles.push_back({handle.name, reaction_of(handle.vertices)});
   }
+  if (const std::vector<int32_t> touching = TouchingVertices(problem); !touching.empty()) {
+    summary.contact = reaction_of(touching);
+  }
   summary.unbalanced_force_n = sum.norm();
   return summary;
 }
@@ -132,6 +147,10 @@ OrderedJson ElasticToJson(const ElasticSummary& summary) {
     OrderedJson of_handle = {{"name", handle.name}};
     AddResultant(handle.reaction, &of_handle);
     json["handles"].push_back(std::move(of_handle));
+  }
+  if (summary.contact) {
+    json["contact"] = OrderedJson::object();
+    AddResultant(*summary.contact, &json["contact"]);
   }
   return json;
 }

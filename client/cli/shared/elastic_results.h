@@ -23,7 +23,8 @@ namespace tissueform {
 // Cell arrays; the latter in single precision.
 inline constexpr char kVonMisesStressArray[] = "von_mises_stress_pa";
 inline constexpr char kEnergyDensityArray[] = "strain_energy_density_pa";
-// Point array: what holds a fixed vertex or one of a handle where it is; zero at free ones.
+// Point array: what holds a fixed vertex or one of a handle where it is, and what bone or the other
+// lip does to a vertex that contact rows name; zero at the other free ones.
 inline constexpr char kReactionForceArray[] = "reaction_force_n";
 
 // Adds the arrays to `file` where the problem's model is elastic. `deformed` is #V by 3, LPS.
@@ -48,7 +49,8 @@ struct ElasticSummary {
   double strain_energy_mj = 0;
   double unbalanced_force_n = 0;  // length of the sum of all reactions
   Resultant fixed;
-  std::vector<HandleReaction> handles;
+  std::vector<HandleReaction> handles;  // without what their bone does through contact rows
+  std::optional<Resultant> contact;     // of all vertices that contact rows name
 };
 
 // Nothing where the problem's model is not elastic.

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <string>
 
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
@@ -31,9 +33,16 @@ std::string NonFinite(const std::string& text) {
 CLI::Validator VtuEnding() { return Ending(".vtu", "OUT.vtu"); }
 CLI::Validator VtpEnding() { return Ending(".vtp", "FILE.vtp"); }
 
-void AddAllowOutside(CLI::App* command, PlanReadOptions* options) {
+void AddPlanOptions(CLI::App* command, PlanReadOptions* options) {
   command->add_flag("--allow-outside", options->allow_outside,
                     "allow a mesh outside the plan's folder");
+  command
+      ->add_option("--contact", options->resolve.contact,
+                   "of a plan with contact rows: on: tissue slides and the lips part; off: tissue "
+                   "sticks and the lips are one piece")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"on", true}, {"off", false}})
+                      .description("{on,off}"))
+      ->default_str("on");
 }
 
 void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) {

@@ -18,8 +18,9 @@ CLI::Validator VtuEnding();
 // The same for surfaces with arrays: .vtp.
 CLI::Validator VtpEnding();
 
-// Adds the flag --allow-outside to a command that reads a plan. `options` outlives the parsing.
-void AddAllowOutside(CLI::App* command, PlanReadOptions* options);
+// Adds --allow-outside and --contact to a command that reads a plan. `options` outlives the
+// parsing.
+void AddPlanOptions(CLI::App* command, PlanReadOptions* options);
 
 // Adds --solver-threads, for a command that makes factors alone in its process: what is given to
 // SetBlasThreads while it prepares. `threads` outlives the parsing and holds the default, 1.

@@ -48,6 +48,29 @@ OrderedJson QualityToJson(const PredictionStats& stats) {
           {"harmonic_max", stats.preparation.harmonic_max}};
 }
 
+OrderedJson ContactToJson(const PredictionStats& stats) {
+  if (stats.contact_use == ContactUse::kLeftOut) return {{"use", "off"}};
+  OrderedJson json = {{"use", "on"}, {"rows", stats.contact_rows}};
+  if (!stats.contact) return json;
+  json["unilateral_rows"] = stats.contact->rows;
+  json["pressing_rows"] = stats.contact->pressing_rows;
+  json["max_force_n"] = stats.contact->max_force_n;
+  json["residual_mm"] = stats.contact->residual_mm;
+  return json;
+}
+
+std::string ContactText(const PredictionStats& stats) {
+  if (stats.contact_use == ContactUse::kLeftOut) {
+    return "contact: off; tissue sticks and the lips are one piece";
+  }
+  std::string text = absl::StrCat("contact: ", stats.contact_rows, " rows");
+  if (!stats.contact) return text;
+  absl::StrAppendFormat(&text, ", %d of %d press, largest force %.3g N, residual %.2g mm",
+                        stats.contact->pressing_rows, stats.contact->rows,
+                        stats.contact->max_force_n, stats.contact->residual_mm);
+  return text;
+}
+
 // To follow what was not reached: begins with a colon, or is empty.
 std::string WhyItGaveUp(const SolveSummary& solve) {
   std::string why;
@@ -82,6 +105,8 @@ PredictionStats StatsOf(const PlanProblem& problem) {
   stats.fixed_vertices = static_cast<Eigen::Index>(problem.constraints.fixed().size());
   stats.handle_vertices = constrained - stats.fixed_vertices;
   stats.free_vertices = stats.vertices - constrained;
+  stats.contact_use = problem.contact_use;
+  stats.contact_rows = problem.constraints.contact().size();
   stats.has_ranges = problem.uncertainty.has_value();
   return stats;
 }
@@ -107,6 +132,7 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
                       {"solver_threads", stats.solver_threads},
                       {"bytes_held", stats.preparation.bytes_held},
                       {"quality", QualityToJson(stats)}};
+  if (stats.contact_use != ContactUse::kNone) json["contact"] = ContactToJson(stats);
   if (stats.elastic) json["elastic"] = ElasticToJson(*stats.elastic);
   if (stats.band) json["material_uncertainty"] = MaterialBandToJson(*stats.band);
   json["notice"] = kNotMedicalDeviceNotice;
@@ -128,6 +154,7 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
   absl::PrintF("%s: %d vertices, largest displacement %.3f mm, volume x %.4f, %d inverted tets\n",
                out, stats.vertices, quality.max_displacement_mm, quality.total_volume_ratio,
                quality.inverted_tets);
+  if (stats.contact_use != ContactUse::kNone) absl::PrintF("%s\n", ContactText(stats));
   if (stats.band) {
     absl::PrintF("%s\n", MaterialBandText(*stats.band));
   } else if (stats.has_ranges) {

@@ -13,6 +13,7 @@
 #include "client/cli/shared/uncertainty_results.h"
 #include "core/mechanics/deformation/deformation_quality.h"
 #include "core/mechanics/deformation/deformer.h"
+#include "core/mechanics/problem/contact_summary.h"
 #include "core/mechanics/problem/plan_problem.h"
 
 namespace tissueform {
@@ -31,6 +32,9 @@ struct PredictionStats {
   double read_seconds = 0;
   PreparationSummary preparation;
   SolveSummary solve;
+  ContactUse contact_use = ContactUse::kNone;
+  size_t contact_rows = 0;                // that were used
+  std::optional<ContactSummary> contact;  // of answers with rows that may lift off
   DeformationQuality quality;
   std::optional<ElasticSummary> elastic;  // of the elastic models
   bool has_ranges = false;                // the plan gives ranges of the material

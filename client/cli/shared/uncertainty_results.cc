@@ -93,6 +93,9 @@ absl::StatusOr<std::optional<MaterialBand>> FindMaterialBand(
     const PlanProblem& problem, const Positions& deformed,
     std::shared_ptr<MeshPreparation> preparation) {
   if (!problem.uncertainty || !IsElastic(problem)) return std::nullopt;
+  if (!problem.constraints.contact().empty()) {
+    return absl::UnimplementedError("it is not known with contact; pass --contact off for it");
+  }
   TF_ASSIGN_OR_RETURN(const std::vector<SkinPlace> places, FreePlaces(problem));
   if (preparation == nullptr) {
     TF_ASSIGN_OR_RETURN(

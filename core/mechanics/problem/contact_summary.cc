@@ -14,11 +14,11 @@ constexpr double kNewtonsPerPaMm2 = 1e-6;
 
 std::optional<ContactSummary> SummarizeContact(const ContactAnswer& contact) {
   if (contact.forces.empty()) return std::nullopt;
-  return ContactSummary{
-      .rows = static_cast<int64_t>(contact.forces.size()),
-      .pressing_rows = std::ranges::count_if(contact.forces, [](double force) { return force > 0; }),
-      .max_force_n = kNewtonsPerPaMm2 * std::ranges::max(contact.forces),
-      .residual_mm = contact.residual_mm};
+  return ContactSummary{.rows = static_cast<int64_t>(contact.forces.size()),
+                        .pressing_rows = std::ranges::count_if(
+                            contact.forces, [](double force) { return force > 0; }),
+                        .max_force_n = kNewtonsPerPaMm2 * std::ranges::max(contact.forces),
+                        .residual_mm = contact.residual_mm};
 }
 
 }  // namespace tissueform

@@ -105,8 +105,12 @@ TEST(PlannedContactTest, VerticesWithRowsAreFreeWhereRegionsSelectThem) {
   EXPECT_THAT(problem.freed, ElementsAre(FreedVertex{9, ConstraintSet::kFixed},
                                          FreedVertex{12, ConstraintSet::kFixed},
                                          FreedVertex{15, ConstraintSet::kFixed}));
-  const auto same = CreateDeformer(*problem.mesh, problem.stiffness, block.Constraints(),
-                                   problem.deformer);
+  const ConstraintSet sticking = StickingRegions(problem);
+  EXPECT_EQ(sticking.fixed(), PartedBlock::Fixed());
+  EXPECT_EQ(sticking.handles()[0].vertices, PartedBlock::Top());
+  EXPECT_THAT(sticking.contact(), IsEmpty());
+  const auto same =
+      CreateDeformer(*problem.mesh, problem.stiffness, block.Constraints(), problem.deformer);
   ASSERT_THAT(same, IsOk());
   EXPECT_EQ(Solve(problem), (*same)->Deform(problem.poses)->positions);
 }
@@ -178,8 +182,7 @@ TEST(PlannedContactTest, RowsNeedVersionFour) {
   Json plan = PlanOfBlock(PartedBlock().rows);
   EXPECT_EQ(LowestPlanVersion(plan), 4);
   plan["version"] = 3;
-  EXPECT_THAT(Parse(plan),
-              IsRefused("key \"contact\" at / came with version 4 of the format"));
+  EXPECT_THAT(Parse(plan), IsRefused("key \"contact\" at / came with version 4 of the format"));
 }
 
 TEST(PlannedContactTest, BadRowsAreNamed) {

@@ -6,12 +6,16 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "nlohmann/json.hpp"
 
 #include "client/cpp/plan_session.h"
+#include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/case_file/case_reader.h"
 #include "core/planning/plan_io.h"
+#include "core/planning/planned_contact.h"
 #include "proto/conversion/session_conversion.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/parted_block.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 
@@ -63,6 +67,36 @@ TEST_F(CasePackTest, TheSessionRequestIsThePlans) {
               1e-12);
     EXPECT_EQ(contents.handles[h].pose.translation_mm, problem.poses[h].translation_mm);
   }
+}
+
+TEST_F(CasePackTest, ContactRowsGoWithTheCase) {
+  const PartedBlock block;
+  ASSERT_THAT(
+      WriteTetMesh(Path("block.vtu"), {.mesh = block.mesh, .point_data = {}, .cell_data = {}}),
+      IsOk());
+  const nlohmann::json plan = {
+      {"format", "tissueform-plan"},
+      {"version", 4},
+      {"unit", "mm"},
+      {"coordinate_system", "LPS"},
+      {"mesh", "block.vtu"},
+      {"stiffness", {{"uniform", 9000}}},
+      {"model", "linear_elastic"},
+      {"fixed", {{"vertices", PartedBlock::Fixed()}}},
+      {"handles", {{{"name", "top"}, {"region", {{"vertices", PartedBlock::Top()}}}}}},
+      {"contact", ContactToJson(block.rows, {"top"}, CoordinateSystem::kLps)}};
+  Write("plan.json", plan.dump());
+  ASSERT_OK_AND_ASSIGN(const CaseFile contents, Packed(Path("plan.json")));
+  v1::CreateSessionRequest request;
+  ASSERT_TRUE(request.ParseFromString(contents.session_request));
+  ASSERT_OK_AND_ASSIGN(const SessionRequest read,
+                       ToSessionRequest(request, {.num_vertices = block.mesh.num_vertices()}));
+  EXPECT_EQ(read.contact, block.rows);
+  ASSERT_TRUE(contents.contact.has_value());
+  EXPECT_EQ(contents.contact->rows, static_cast<int64_t>(block.rows.size()));
+  ASSERT_EQ(contents.contact->sticking.rows(), 3);
+  EXPECT_EQ(contents.contact->sticking.col(0), Eigen::Vector3i(9, 12, 15));
+  EXPECT_EQ(contents.contact->sticking.col(1), Eigen::Vector3i(-1, -1, -1));
 }
 
 TEST_F(CasePackTest, TheBundledHeadShowsTheWholeHead) {

@@ -8,8 +8,10 @@
 
 #include "core/mesh/io/tet_mesh_io.h"
 #include "core/mesh/tet_quality.h"
+#include "core/planning/planned_contact.h"
 #include "tests/testing/bar_mesh.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/parted_block.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 
@@ -373,6 +375,64 @@ TEST_F(DeformTest, PlanCheckWarnsOfAMeshThatIsProbablyNotInMillimeters) {
   const ProcessResult result = Run({"plan", "check", "plan.json"});
   EXPECT_THAT(result, Succeeds());
   EXPECT_THAT(result.out, HasSubstr("warning    the diagonal of the bounding box is 0.0"));
+}
+
+// A block with a mouth: what sticks has the answer of the block that was never parted.
+TEST_F(DeformTest, ContactIsReportedAndCanBeTurnedOff) {
+  const PartedBlock block;
+  nlohmann::json plan = BarPlan();
+  plan.erase("uncertainty");
+  plan["version"] = 4;
+  plan["mesh"] = "block.vtu";
+  plan["stiffness"] = {{"uniform", 9000}};
+  plan["model"] = "linear_elastic";
+  plan["fixed"] = {{"vertices", PartedBlock::Fixed()}};
+  plan["handles"] = {{{"name", "top"},
+                      {"region", {{"vertices", PartedBlock::Top()}}},
+                      {"pose", {{"translation_mm", {0.05, -0.1, -0.4}}}}}};
+  plan["contact"] = ContactToJson(block.rows, {"top"}, CoordinateSystem::kLps);
+  Write("plan.json", plan.dump());
+  plan.erase("contact");
+  plan["mesh"] = "whole.vtu";
+  Write("whole.json", plan.dump());
+  ASSERT_THAT(
+      WriteTetMesh(Path("block.vtu"), {.mesh = block.mesh, .point_data = {}, .cell_data = {}}),
+      IsOk());
+  ASSERT_THAT(WriteTetMesh(Path("whole.vtu"),
+                           {.mesh = PartedBlock::Whole(), .point_data = {}, .cell_data = {}}),
+              IsOk());
+
+  const ProcessResult on = Run({"deform", "plan.json", "--out", "on.vtu", "--stats", "on.json"});
+  EXPECT_THAT(on, Succeeds());
+  EXPECT_THAT(on.out, HasSubstr("press, largest force"));
+  const nlohmann::json of_on = nlohmann::json::parse(Read("on.json"));
+  EXPECT_EQ(of_on["contact"]["use"], "on");
+  EXPECT_EQ(of_on["contact"]["rows"], block.rows.size());
+  EXPECT_GT(of_on["contact"]["pressing_rows"], 0);
+  EXPECT_GT(of_on["contact"]["max_force_n"], 0);
+  EXPECT_LT(of_on["contact"]["residual_mm"], 1e-6);
+  // All that holds the tissue is in balance.
+  EXPECT_LT(of_on["elastic"]["unbalanced_force_n"], 1e-9);
+
+  EXPECT_THAT(Run({"plan", "check", "plan.json"}).out, HasSubstr("contact    10 rows, of them 3"));
+  const ProcessResult off =
+      Run({"deform", "plan.json", "--out", "off.vtu", "--stats", "off.json", "--contact", "off"});
+  EXPECT_THAT(off, Succeeds());
+  EXPECT_THAT(off.out, HasSubstr("contact: off"));
+  EXPECT_EQ(nlohmann::json::parse(Read("off.json"))["contact"]["use"], "off");
+  EXPECT_THAT(Run({"deform", "whole.json", "--out", "never.vtu", "--stats", "never.json"}),
+              Succeeds());
+  EXPECT_FALSE(nlohmann::json::parse(Read("never.json")).contains("contact"));
+  EXPECT_EQ(Read("off.vtu"), Read("never.vtu")) << "to the last byte";
+  EXPECT_NE(Read("off.vtu"), Read("on.vtu"));
+}
+
+TEST_F(DeformTest, ContactIsOnOrOff) {
+  WriteBar();
+  const ProcessResult result =
+      Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "a.vtu", "--contact", "maybe"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--contact"));
 }
 
 }  // namespace
