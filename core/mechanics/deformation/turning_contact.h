@@ -24,7 +24,8 @@ namespace tissueform {
 
 // Contact of a body in large deformation. The normal of a row on a handle's bone turns with the
 // handle, n = R n_0, and the bone's point goes with its pose; normals on fixed bone and between two
-// lips stay. For given poses every row is then linear in the displacements, as in ContactRow.
+// lips stay, which errs by the square of what lips turn by (docs/accuracy.md, "Contact"). For given
+// poses every row is then linear in the displacements, as in ContactRow.
 //
 // The rows that are met at a time are the bilateral ones and the closed ones, a part of the
 // unilateral rows that the user chooses; a search keeps to displacements that meet them. It works
