@@ -103,10 +103,10 @@ class FitCall : public grpc::ServerUnaryReactor {
 
   absl::Status Resolve() {
     TF_ASSIGN_OR_RETURN(model_, ToModel(request_.model(), session_->model()));
-    if (!HasPreparedAnswers(model_, session_->gradient_field())) {
-      return absl::InvalidArgumentError(
-          "the model has no prepared answers; choose linear_elastic, neo_hookean, or "
-          "gradient_field with propagated rotations and cotangent guidance");
+    const ConstraintSet& constraints = session_->constraints();
+    if (!HasPreparedAnswers(model_, session_->gradient_field(), constraints)) {
+      return absl::InvalidArgumentError(absl::StrCat("the model has no prepared answers; choose ",
+                                                     ModelsWithPreparedAnswers(constraints)));
     }
     TF_ASSIGN_OR_RETURN(const std::vector<HandlePose> start,
                         StartOf(request_, session_->constraints()));

@@ -117,12 +117,12 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
     responses_.splice(responses_.begin(), responses_, found);
     return responses_.front();
   }
-  if (!HasPreparedAnswers(request.model, gradient_field)) {
-    return WithReason(
-        absl::InvalidArgumentError(
-            "only gradient_field with propagated rotations and cotangent guidance, "
-            "linear_elastic and neo_hookean have prepared answers; leave `prepared` out"),
-        ErrorReason::kNoPreparedAnswers);
+  const ConstraintSet& constraints = preparation_->constraints();
+  if (!HasPreparedAnswers(request.model, gradient_field, constraints)) {
+    return WithReason(absl::InvalidArgumentError(absl::StrCat(
+                          "the model has no prepared answers; leave `prepared` out, or choose ",
+                          ModelsWithPreparedAnswers(constraints))),
+                      ErrorReason::kNoPreparedAnswers);
   }
   feed_.Begin(TopicOf(request));
   const absl::Cleanup end_of_topic = [this] { feed_.End(); };

@@ -84,9 +84,10 @@ TEST_F(PlanSessionTest, StreamsArePreparedForTheModelsThatHavePreparedAnswers) {
     DeformStream::Options stream;
     stream.vertices.kind = AnswerVertices::Kind::kSkin;
     stream.prepared.emplace();
-    EXPECT_EQ(client->OpenStream(session->name(), stream).ok(), HasPreparedAnswers(options))
+    EXPECT_EQ(client->OpenStream(session->name(), stream).ok(),
+              HasPreparedAnswers(options, problem.constraints))
         << static_cast<int>(options.model);
-    prepared += HasPreparedAnswers(options) ? 1 : 0;
+    prepared += HasPreparedAnswers(options, problem.constraints) ? 1 : 0;
   }
   EXPECT_EQ(prepared, 3);
 }

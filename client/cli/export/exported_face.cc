@@ -26,11 +26,12 @@ absl::StatusOr<DeformationModel> ChosenModel(const PlanProblem& problem, const s
   if (!name.empty()) {
     TF_ASSIGN_OR_RETURN(model, ModelFromName(name));
   }
-  if (HasPreparedAnswers(model, problem.deformer.gradient_field)) return model;
+  if (HasPreparedAnswers(model, problem.deformer.gradient_field, problem.constraints)) return model;
   return absl::InvalidArgumentError(absl::StrCat(
       "the model ", ModelName(model),
-      ", with the plan's settings, has no prepared answers, which a moving file needs; choose "
-      "linear_elastic or neo_hookean with --model"));
+      ", with the plan's settings, has no prepared answers, which a moving file needs; choose one "
+      "with --model: ",
+      ModelsWithPreparedAnswers(problem.constraints)));
 }
 
 absl::StatusOr<std::vector<bool>> FreeHandles(const std::vector<CaseHandle>& handles,

@@ -72,16 +72,13 @@ absl::Status CheckOut(const PlanFitOptions& options) {
   return absl::OkStatus();
 }
 
-absl::Status CheckModel(const Plan& plan) {
-  if (!HasPreparedAnswers(plan.model, plan.gradient_field)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("model ", ModelName(plan.model),
-                     plan.model == DeformationModel::kGradientField
-                         ? " with these settings (only propagated rotations, cotangent guidance)"
-                         : "",
-                     " has no prepared answers, which fitting needs; use --model linear_elastic, "
-                     "neo_hookean, or a "
-                     "plan of gradient_field"));
+absl::Status CheckModel(const Plan& plan, const ConstraintSet& constraints) {
+  if (!HasPreparedAnswers(plan.model, plan.gradient_field, constraints)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "model ", ModelName(plan.model),
+        ", with the plan's settings, has no prepared answers, which fitting needs; use "
+        "--model with ",
+        ModelsWithPreparedAnswers(constraints)));
   }
   const bool is_scaled = std::any_of(plan.handles.begin(), plan.handles.end(),
                                      [](const PlannedHandle& h) { return h.pose.scale != 1; });
@@ -163,8 +160,8 @@ absl::Status RunPlanFit(const PlanFitOptions& options) {
   if (!options.model.empty()) {
     TF_ASSIGN_OR_RETURN(plan.model, ModelFromName(options.model));
   }
-  TF_RETURN_IF_ERROR(CheckModel(plan));
   TF_ASSIGN_OR_RETURN(PlanProblem resolved, ResolvePlan(plan, options.reading.resolve));
+  TF_RETURN_IF_ERROR(CheckModel(plan, resolved.constraints));
   resolved.deformer.preparation.threads = options.threads;
   TF_ASSIGN_OR_RETURN(const FitRequest request, ReadFitTargets(options.targets, resolved));
   absl::StatusOr<FitProblem> problem =

@@ -160,7 +160,7 @@ absl::StatusOr<TwoDrags> DragTwice(const DemoOptions& options, const PlanProblem
   DragOptions skin = options.drag;
   skin.stream.vertices.kind = AnswerVertices::Kind::kSkin;
   if (options.encoding == "int16") skin.stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;
-  if (HasPreparedAnswers(problem.deformer)) skin.stream.prepared.emplace();
+  if (HasPreparedAnswers(problem.deformer, problem.constraints)) skin.stream.prepared.emplace();
   absl::PrintF("dragging: %s, over %g s at %g poses per second ...\n", MovesInWords(problem),
                options.drag.seconds, options.drag.poses_per_second);
   TwoDrags drags;

@@ -80,7 +80,8 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem,
                                          const DragCommandOptions& options, DragTotals* totals) {
   ReattachingStream::Options stream;
   stream.stream.vertices.kind = AnswerVertices::Kind::kSkin;
-  if (HasPreparedAnswers(problem.deformer)) stream.stream.prepared = PreparedAnswersOf(problem);
+  if (HasPreparedAnswers(problem.deformer, problem.constraints))
+    stream.stream.prepared = PreparedAnswersOf(problem);
   stream.reattachment.give_up_after =
       std::chrono::milliseconds(static_cast<int64_t>(1e3 * options.give_up_seconds));
   stream.stream.on_notice = [](const v1::DeformNotice& notice) {

@@ -157,7 +157,7 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
   if (stats.contact_use != ContactUse::kNone) absl::PrintF("%s\n", ContactText(stats));
   if (stats.band) {
     absl::PrintF("%s\n", MaterialBandText(*stats.band));
-  } else if (stats.has_ranges) {
+  } else if (stats.has_ranges && stats.contact_use != ContactUse::kOn) {
     absl::PrintF("material uncertainty: only for linear_elastic and neo_hookean\n");
   }
   if (quality.inverted_tets > 0) {

@@ -25,7 +25,7 @@ ReattachingStream::Options StreamOptions(const PlanProblem& problem, bool int16)
   ReattachingStream::Options options;
   options.stream.vertices.kind = AnswerVertices::Kind::kSkin;
   if (int16) options.stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;
-  if (HasPreparedAnswers(problem.deformer)) options.stream.prepared.emplace();
+  if (HasPreparedAnswers(problem.deformer, problem.constraints)) options.stream.prepared.emplace();
   return options;
 }
 

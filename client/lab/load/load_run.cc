@@ -63,7 +63,7 @@ class LoadDrag {
     if (kind.int16) stream.encoding = v1::POSITION_ENCODING_INT16_ZSTD;
     if (kind.neo_hookean) {
       stream.model = v1::DEFORMATION_MODEL_NEO_HOOKEAN;
-    } else if (HasPreparedAnswers(problem.deformer)) {
+    } else if (HasPreparedAnswers(problem.deformer, problem.constraints)) {
       stream.prepared.emplace();
     }
     options.reattachment.give_up_after = kFailoverPatience;

@@ -18,8 +18,8 @@ namespace {
 constexpr double kMaxOfAnything = 1 << 28;  // fits into int32_t, and products of two into size_t
 constexpr double kMaxHandles = 10000;
 constexpr double kMaxDegree = 1000;
-constexpr size_t kMaxContactRows = 1000;  // of which a pose may take seconds at worst
-constexpr size_t kMaxBandVariables = 17;  // 16 tissues and Poisson's ratio
+constexpr size_t kMaxUnilateralRows = 1000;  // of which a pose may take seconds at worst
+constexpr size_t kMaxBandVariables = 17;     // 16 tissues and Poisson's ratio
 
 bool IsCount(double value, double least, double most) {
   return value >= least && value <= most && value == std::floor(value);
@@ -166,7 +166,7 @@ bool SeriesFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
 bool ContactFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
   const size_t rows = answers.contact_gaps.size();
   const auto is_negative = [](double gap_mm) { return gap_mm < 0; };
-  if (rows > kMaxContactRows || answers.contact_gap_map.size() != rows * 12 * sizes.handles ||
+  if (rows > kMaxUnilateralRows || answers.contact_gap_map.size() != rows * 12 * sizes.handles ||
       answers.contact_compliance.size() != rows * rows ||
       std::any_of(answers.contact_gaps.begin(), answers.contact_gaps.end(), is_negative)) {
     return false;

@@ -34,9 +34,10 @@ struct ContactRow {
   friend bool operator==(const ContactRow&, const ContactRow&) = default;
 };
 
-// Limits of one constraint set. Rows that may lift off are condensed to one dense matrix.
+// Limits of one constraint set. Rows that may lift off are condensed to one dense matrix, and a
+// pose takes as long as their active set; prepared answers (answer_checks.cc) have the same limit.
 inline constexpr size_t kMaxContactRows = 16384;
-inline constexpr size_t kMaxUnilateralRows = 4096;
+inline constexpr size_t kMaxUnilateralRows = 1000;
 
 // InvalidArgument, naming the row by its index and saying what to do, unless in every row
 //  * the vertices lie in [0, #V), are not among `is_constrained` (#V) and differ;

@@ -26,24 +26,29 @@ bool Iterates(DeformationModel model, const GradientFieldOptions& gradient_field
                                       gradient_field.rotation == RotationMode::kEstimated);
 }
 
-bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field) {
+bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field,
+                        const ConstraintSet& constraints) {
+  if (!constraints.contact().empty()) return TraitsOf(model).has_prepared_contact;
   const bool settings_have = model != DeformationModel::kGradientField ||
                              (gradient_field.rotation == RotationMode::kPropagated &&
                               gradient_field.guidance == Guidance::kCotangent);
   return TraitsOf(model).has_prepared_answers && settings_have;
 }
 
-bool HasPreparedAnswers(const DeformerOptions& options) {
-  return HasPreparedAnswers(options.model, options.gradient_field);
+bool HasPreparedAnswers(const DeformerOptions& options, const ConstraintSet& constraints) {
+  return HasPreparedAnswers(options.model, options.gradient_field, constraints);
+}
+
+absl::string_view ModelsWithPreparedAnswers(const ConstraintSet& constraints) {
+  return constraints.contact().empty()
+             ? "linear_elastic, neo_hookean, or gradient_field with propagated rotations and "
+               "cotangent guidance"
+             : "linear_elastic, which alone has them with contact";
 }
 
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
     const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options,
     const Cancellation& cancellation) {
-  const ModelTraits& model = TraitsOf(options.model);
-  if (!model.has_contact) {
-    TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), model.name));
-  }
   switch (options.model) {
     case DeformationModel::kGradientField:
       break;

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
 #include "core/base/cancellation.h"
 #include "core/mechanics/constraints/constraint_set.h"
@@ -33,8 +34,12 @@ struct DeformerOptions {
 bool Iterates(DeformationModel model, const GradientFieldOptions& gradient_field);
 
 // Whether the model with these settings has prepared answers (core/mechanics/prepared_answers).
-bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field);
-bool HasPreparedAnswers(const DeformerOptions& options);
+bool HasPreparedAnswers(DeformationModel model, const GradientFieldOptions& gradient_field,
+                        const ConstraintSet& constraints);
+bool HasPreparedAnswers(const DeformerOptions& options, const ConstraintSet& constraints);
+
+// What has them, for messages: "linear_elastic, ...".
+absl::string_view ModelsWithPreparedAnswers(const ConstraintSet& constraints);
 
 // The one switch over models. Models made from one preparation share what it holds;
 // `options.preparation` is not read. `cancellation` is asked between the stages.

@@ -23,9 +23,7 @@ struct ModelTraits {
   bool is_elastic;
   // gradient_field: with propagated rotations and cotangent guidance only (HasPreparedAnswers).
   bool has_prepared_answers;
-  // Tissue that touches bone or other tissue (ConstraintSet::contact) slides and lifts off.
-  bool has_contact;
-  // ... also in prepared answers.
+  // Also where tissue touches bone or other tissue (ConstraintSet::contact).
   bool has_prepared_contact;
 };
 

@@ -234,13 +234,6 @@ double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
   return std::max(kBandVoxels * recipe.spacing_mm, kBandOfMove * largest_move_mm);
 }
 
-std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
-  std::vector<std::string> names;
-  names.reserve(segments.size());
-  for (const BuiltSegment& segment : segments) names.push_back(segment.cut.name);
-  return names;
-}
-
 // What the tets are made of and what holds the vertices.
 absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTissue& soft_tissue,
                                      const Anatomy& anatomy,
@@ -275,6 +268,13 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
 }
 
 }  // namespace
+
+std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
+  std::vector<std::string> names;
+  names.reserve(segments.size());
+  for (const BuiltSegment& segment : segments) names.push_back(segment.cut.name);
+  return names;
+}
 
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options) {

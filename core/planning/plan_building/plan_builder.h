@@ -45,6 +45,8 @@ struct BuiltSegment {
   TriangleMesh surface;  // closed, LPS
 };
 
+std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments);
+
 // A planning model with all that led to it: what is written, reported and drawn. BuildPlan makes it
 // whole, at the end, from what its stages return; there is none without its mesh.
 struct PlanBuild {

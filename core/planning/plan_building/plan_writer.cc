@@ -21,6 +21,7 @@
 #include "core/planning/plan_building/viewer_landmarks.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/plan_schema.h"
+#include "core/planning/planned_contact.h"
 #include "core/planning/tissue_ranges.h"
 
 namespace tissueform {
@@ -52,20 +53,6 @@ Json UncertaintyJson(const FactorByCellData& factors) {
   return {{"youngs_modulus_factor_95", {{"by_cell_data", factors.name}, {"values", values}}}};
 }
 
-Json ContactRowJson(const ContactRow& row, const std::vector<BuiltSegment>& segments) {
-  Json json = {{"vertex", row.vertex}, {"normal", ToJson(row.normal)}};
-  if (row.other != ContactRow::kBone) {
-    json["other_vertex"] = row.other;
-  } else if (row.handle == ContactRow::kFixedBone) {
-    json["fixed"] = true;
-  } else {
-    json["handle"] = segments[static_cast<size_t>(row.handle)].cut.name;
-  }
-  if (row.gap_mm > 0) json["gap_mm"] = row.gap_mm;
-  if (row.bilateral) json["bilateral"] = true;
-  return json;
-}
-
 std::string PlanJson(const PlanBuild& build) {
   Json plan = {{"format", "tissueform-plan"},
                {"unit", "mm"},
@@ -84,26 +71,11 @@ std::string PlanJson(const PlanBuild& build) {
     plan["uncertainty"] = UncertaintyJson(*factors);
   }
   if (build.lips) {
-    for (const ContactRow& row : build.lips->rows) {
-      plan["contact"]["rows"].push_back(ContactRowJson(row, build.segments));
-    }
+    plan["contact"] =
+        ContactToJson(build.lips->rows, NamesOf(build.segments), CoordinateSystem::kLps);
   }
   plan["version"] = LowestPlanVersion(plan);
   return plan.dump(2) + "\n";
-}
-
-PlannedContactRow Planned(const ContactRow& row, const std::vector<BuiltSegment>& segments) {
-  PlannedContactRow planned{.vertex = row.vertex,
-                            .other = {},
-                            .normal = row.normal,
-                            .gap_mm = row.gap_mm,
-                            .bilateral = row.bilateral};
-  if (row.other != ContactRow::kBone) {
-    planned.other = int64_t{row.other};
-  } else if (row.handle != ContactRow::kFixedBone) {
-    planned.other = segments[static_cast<size_t>(row.handle)].cut.name;
-  }
-  return planned;
 }
 
 VertexSelector SelectLabel(size_t label) {
@@ -125,9 +97,9 @@ Plan PlanOf(const PlanBuild& build) {
                             .pose = PoseFromJson(ToJson(build.segments[s].pose))});
   }
   if (build.lips) {
-    for (const ContactRow& row : build.lips->rows) {
-      plan.contact.push_back(Planned(row, build.segments));
-    }
+    // As with poses: what is read back.
+    plan.contact = ContactFromJson(
+        ContactToJson(build.lips->rows, NamesOf(build.segments), CoordinateSystem::kLps));
   }
   plan.model = build.recipe.model;
   if (const auto factors = FactorsOf(build.recipe.tissues)) {
@@ -167,9 +139,7 @@ absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& 
 // It says which mesh file it belongs to, by what has been written of that.
 absl::Status WriteViewer(const PlanBuild& build, const std::filesystem::path& folder) {
   TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256((folder / kMeshFile).string()));
-  std::vector<std::string> segments;
-  segments.reserve(build.segments.size());
-  for (const BuiltSegment& segment : build.segments) segments.push_back(segment.cut.name);
+  const std::vector<std::string> segments = NamesOf(build.segments);
   TF_ASSIGN_OR_RETURN(const std::string bytes,
                       SerializeViewer({.mesh_file_sha256 = mesh_sha256,
                                        .surfaces = build.viewer_surfaces,

@@ -4,11 +4,8 @@
 // All of the anatomy on CTs of people: what pictures of them show.
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <itkMultiThreaderBase.h>
 #include <string>
-#include <unistd.h>
 
 #include "absl/strings/str_cat.h"
 
@@ -23,6 +20,7 @@
 #include "core/imaging/ct/unscanned.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
+#include "tests/testing/unpacked_archive.h"
 
 namespace tissueform {
 namespace {
@@ -31,6 +29,7 @@ using ::testing::HasSubstr;
 using testing::SharedDataPath;
 using testing::StatusIs;
 using testing::TestDataPath;
+using testing::UnpackedArchive;
 
 struct Anatomy {
   HeadSegmentation head;
@@ -221,29 +220,6 @@ TEST(RealHeadsTest, ResultsDoNotDependOnTheNumberOfThreads) {
   EXPECT_EQ(one->soft.labels.values, three->soft.labels.values);
   EXPECT_EQ(one->landmarks.nose_tip, three->landmarks.nose_tip);
 }
-
-// Where the data set's archive is unpacked; gone at the end of the test.
-class UnpackedArchive {
- public:
-  explicit UnpackedArchive(const std::string& archive, const std::string& members)
-      : folder_(std::filesystem::path(::testing::TempDir()) /
-                absl::StrCat("real_heads_", getpid())) {
-    std::filesystem::create_directories(folder_);
-    const std::string command =
-        absl::StrCat("tar -xJf '", archive, "' -C '", folder_.string(), "' --wildcards ", members);
-    ok_ = std::system(command.c_str()) == 0;
-  }
-  ~UnpackedArchive() { std::filesystem::remove_all(folder_); }
-  UnpackedArchive(const UnpackedArchive&) = delete;
-  UnpackedArchive& operator=(const UnpackedArchive&) = delete;
-
-  bool ok() const { return ok_; }
-  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
-
- private:
-  std::filesystem::path folder_;
-  bool ok_ = false;
-};
 
 // From the shoulders to the eyes. Upper and lower teeth touch, and fillings throw streaks.
 TEST(RealHeadsTest, ACadaverWithTeethInOcclusionIsTakenApart) {

