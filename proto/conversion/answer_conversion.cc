@@ -62,9 +62,9 @@ v1::SolveSummary ToProto(const SolveSummary& summary) {
   return proto;
 }
 
-v1::SolveSummary ToSummaryProto(const Deformation& deformation) {
+v1::SolveSummary ToSummaryProto(const Deformation& deformation, DeformationModel model) {
   v1::SolveSummary proto = ToProto(deformation.summary);
-  if (const auto contact = SummarizeContact(deformation.contact)) {
+  if (const auto contact = SummarizeContact(deformation.contact, model)) {
     *proto.mutable_contact() = ToProto(*contact);
   }
   return proto;

@@ -15,7 +15,7 @@ v1::SolveSummary ToProto(const SolveSummary& summary);
 SolveSummary ToSolveSummary(const v1::SolveSummary& summary);
 
 // Also with the contact of the answer.
-v1::SolveSummary ToSummaryProto(const Deformation& deformation);
+v1::SolveSummary ToSummaryProto(const Deformation& deformation, DeformationModel model);
 
 v1::DeformationQuality ToProto(const DeformationQuality& quality);
 DeformationQuality ToDeformationQuality(const v1::DeformationQuality& quality);

@@ -89,16 +89,18 @@ v1::ContactSummary ToProto(const ContactSummary& summary) {
   v1::ContactSummary proto;
   proto.set_row_count(static_cast<int32_t>(summary.rows));
   proto.set_pressing_row_count(static_cast<int32_t>(summary.pressing_rows));
-  proto.set_max_force_n(summary.max_force_n);
+  if (summary.max_force_n) proto.set_max_force_n(*summary.max_force_n);
   proto.set_residual_mm(summary.residual_mm);
   return proto;
 }
 
 ContactSummary ToContactSummary(const v1::ContactSummary& proto) {
-  return {.rows = proto.row_count(),
-          .pressing_rows = proto.pressing_row_count(),
-          .max_force_n = proto.max_force_n(),
-          .residual_mm = proto.residual_mm()};
+  ContactSummary summary{.rows = proto.row_count(),
+                         .pressing_rows = proto.pressing_row_count(),
+                         .max_force_n = std::nullopt,
+                         .residual_mm = proto.residual_mm()};
+  if (proto.has_max_force_n()) summary.max_force_n = proto.max_force_n();
+  return summary;
 }
 
 }  // namespace tissueform

@@ -134,7 +134,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
             choice_ = {.all = false, .vertices = answer->session->mesh().skin};
           }
           comparison_.set_other_model(ToProto(answer->model));
-          *comparison_.mutable_other_summary() = ToSummaryProto(answer->deformation);
+          *comparison_.mutable_other_summary() = ToSummaryProto(answer->deformation, answer->model);
           *comparison_.mutable_other_quality() = ToProto(
               MeasureDeformation(answer->session->mesh().mesh, answer->deformation.positions));
           PostCompare(Rounded(answer->deformation.positions));

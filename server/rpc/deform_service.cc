@@ -70,7 +70,7 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
   // On the session's strand.
   void Describe(const SingleAnswer& answer) {
     const TetMesh& mesh = answer.session->mesh().mesh;
-    *response_.mutable_summary() = ToSummaryProto(answer.deformation);
+    *response_.mutable_summary() = ToSummaryProto(answer.deformation, answer.model);
     *response_.mutable_quality() = ToProto(MeasureDeformation(mesh, answer.deformation.positions));
     EncodedPositions encoded = EncodePositions(answer.deformation.positions, choice_,
                                                request_.encoding(), mesh.positions());

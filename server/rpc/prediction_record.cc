@@ -47,7 +47,7 @@ v1::Prediction Describe(const SingleAnswer& answer) {
   }
   prediction.set_model(ToProto(answer.model));
   SetSettings(session, &prediction);
-  *prediction.mutable_summary() = ToSummaryProto(answer.deformation);
+  *prediction.mutable_summary() = ToSummaryProto(answer.deformation, answer.model);
   *prediction.mutable_quality() =
       ToProto(MeasureDeformation(session.mesh().mesh, answer.deformation.positions));
   prediction.set_software_version(SoftwareVersion());

@@ -77,7 +77,7 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* s
   TF_ASSIGN_OR_RETURN(Deformation deformation, Solve(deformer.get(), problem.poses));
   stats->preparation = deformer->preparation();
   stats->solve = deformation.summary;
-  stats->contact = SummarizeContact(deformation.contact);
+  stats->contact = SummarizeContact(deformation.contact, problem.deformer.model);
   stats->quality = MeasureDeformation(*problem.mesh, deformation.positions);
   stats->band = FindMaterialBandOrWarn(problem, deformation.positions, std::move(preparation));
   return std::move(deformation.positions);

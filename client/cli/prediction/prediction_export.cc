@@ -206,8 +206,10 @@ OrderedJson ProvenanceJson(const v1::Prediction& prediction) {
   if (summary.has_contact()) {
     json["solve"]["contact"] = {{"unilateral_rows", summary.contact().row_count()},
                                 {"pressing_rows", summary.contact().pressing_row_count()},
-                                {"max_force_n", summary.contact().max_force_n()},
                                 {"residual_mm", summary.contact().residual_mm()}};
+    if (summary.contact().has_max_force_n()) {
+      json["solve"]["contact"]["max_force_n"] = summary.contact().max_force_n();
+    }
   }
   const v1::DeformationQuality& quality = prediction.quality();
   json["quality"] = {{"inverted_tets", quality.inverted_tet_count()},

@@ -54,7 +54,7 @@ OrderedJson ContactToJson(const PredictionStats& stats) {
   if (!stats.contact) return json;
   json["unilateral_rows"] = stats.contact->rows;
   json["pressing_rows"] = stats.contact->pressing_rows;
-  json["max_force_n"] = stats.contact->max_force_n;
+  if (stats.contact->max_force_n) json["max_force_n"] = *stats.contact->max_force_n;
   json["residual_mm"] = stats.contact->residual_mm;
   return json;
 }
@@ -65,9 +65,12 @@ std::string ContactText(const PredictionStats& stats) {
   }
   std::string text = absl::StrCat("contact: ", stats.contact_rows, " rows");
   if (!stats.contact) return text;
-  absl::StrAppendFormat(&text, ", %d of %d press, largest force %.3g N, residual %.2g mm",
-                        stats.contact->pressing_rows, stats.contact->rows,
-                        stats.contact->max_force_n, stats.contact->residual_mm);
+  absl::StrAppendFormat(&text, ", %d of %d press", stats.contact->pressing_rows,
+                        stats.contact->rows);
+  if (stats.contact->max_force_n) {
+    absl::StrAppendFormat(&text, ", largest force %.3g N", *stats.contact->max_force_n);
+  }
+  absl::StrAppendFormat(&text, ", residual %.2g mm", stats.contact->residual_mm);
   return text;
 }
 

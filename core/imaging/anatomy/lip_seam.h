@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -61,7 +62,8 @@ class LipSeam {
   const MouthLine& line() const { return line_; }
 
  private:
-  LipSeam(MouthLine line, const FaceAxes& axes, DentalArch upper, DentalArch lower, double edge_up)
+  LipSeam(MouthLine line, const FaceAxes& axes, const DentalArch& upper, const DentalArch& lower,
+          double edge_up)
       : line_(std::move(line)), axes_(axes), upper_(upper), lower_(lower), edge_up_(edge_up) {}
 
   FaceCoordinates OnLine(double left) const;

@@ -12,13 +12,18 @@ constexpr double kNewtonsPerPaMm2 = 1e-6;
 
 }  // namespace
 
-std::optional<ContactSummary> SummarizeContact(const ContactAnswer& contact) {
+std::optional<ContactSummary> SummarizeContact(const ContactAnswer& contact,
+                                               DeformationModel model) {
   if (contact.forces.empty()) return std::nullopt;
-  return ContactSummary{.rows = static_cast<int64_t>(contact.forces.size()),
-                        .pressing_rows = std::ranges::count_if(
-                            contact.forces, [](double force) { return force > 0; }),
-                        .max_force_n = kNewtonsPerPaMm2 * std::ranges::max(contact.forces),
-                        .residual_mm = contact.residual_mm};
+  ContactSummary summary{.rows = static_cast<int64_t>(contact.forces.size()),
+                         .pressing_rows = std::ranges::count_if(
+                             contact.forces, [](double force) { return force > 0; }),
+                         .max_force_n = std::nullopt,
+                         .residual_mm = contact.residual_mm};
+  if (TraitsOf(model).is_elastic) {
+    summary.max_force_n = kNewtonsPerPaMm2 * std::ranges::max(contact.forces);
+  }
+  return summary;
 }
 
 }  // namespace tissueform

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/mechanics/deformation/deformer.h"
+#include "core/mechanics/deformation/model.h"
 
 namespace tissueform {
 
@@ -14,13 +15,16 @@ namespace tissueform {
 struct ContactSummary {
   int64_t rows = 0;
   int64_t pressing_rows = 0;  // those with a force
-  double max_force_n = 0;     // largest force of a row
-  double residual_mm = 0;     // ContactAnswer::residual_mm
+  // Largest force of a row; only of elastic models, as the others know where contact is, but not
+  // how strong.
+  std::optional<double> max_force_n;
+  double residual_mm = 0;  // ContactAnswer::residual_mm
 
   friend bool operator==(const ContactSummary&, const ContactSummary&) = default;
 };
 
 // Nothing where the answer has no such rows.
-std::optional<ContactSummary> SummarizeContact(const ContactAnswer& contact);
+std::optional<ContactSummary> SummarizeContact(const ContactAnswer& contact,
+                                               DeformationModel model);
 
 }  // namespace tissueform
