@@ -5,6 +5,7 @@
 
 #include "core/mechanics/deformation/deformation_quality.h"
 #include "core/mechanics/deformation/deformer.h"
+#include "core/mechanics/deformation/model.h"
 #include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/session.pb.h"
 

@@ -6,6 +6,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
+#include <optional>
 
 #include "absl/strings/string_view.h"
 
@@ -64,6 +66,30 @@ VoxelGrid<T> Crop(const VoxelGrid<T>& grid, const VoxelBox& box) {
     }
   }
   return part;
+}
+
+// The voxel nearest to a place whose label is wanted, among those at most `reach` voxels from it
+// along each axis; of those equally near the first in memory.
+template <typename Wanted>
+std::optional<Eigen::Vector3i> NearestVoxel(const LabelGrid& labels, const Eigen::Vector3d& place,
+                                            int reach, Wanted wanted) {
+  const Eigen::Vector3d at = labels.geometry.ToVoxels(place);
+  const Eigen::Vector3i centre = at.array().round().cast<int>();
+  std::optional<Eigen::Vector3i> nearest;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int z = centre.z() - reach; z <= centre.z() + reach; ++z) {
+    for (int y = centre.y() - reach; y <= centre.y() + reach; ++y) {
+      for (int x = centre.x() - reach; x <= centre.x() + reach; ++x) {
+        if (!labels.geometry.Contains(x, y, z) || !wanted(labels.At(x, y, z))) continue;
+        const double distance = (Eigen::Vector3d(x, y, z) - at).squaredNorm();
+        if (distance < smallest) {
+          smallest = distance;
+          nearest = Eigen::Vector3i(x, y, z);
+        }
+      }
+    }
+  }
+  return nearest;
 }
 
 // Calls visit(index, centre_mm) for every voxel where `mask` is not 0, in the order of the memory.

@@ -28,8 +28,7 @@ LaplacianContact::LaplacianContact(const ConstraintSet& constraints)
     if (rows_[r].other != ContactRow::kBone) vertices_.push_back(rows_[r].other);
   }
   std::ranges::sort(vertices_);
-  const auto repeated = std::ranges::unique(vertices_);
-  vertices_.erase(repeated.begin(), repeated.end());
+  vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
 }
 
 absl::StatusOr<std::unique_ptr<LaplacianContact>> LaplacianContact::Create(

@@ -54,13 +54,17 @@ class Parting {
     });
   }
 
-  absl::StatusOr<PartedMesh> Run() {
+  absl::StatusOr<PartedMesh> Run(const std::vector<bool>& stays_joined) {
     if (openings_.empty()) {
       return absl::InvalidArgumentError("the seam parts nothing; correct its line");
     }
     TetIndices tets = mesh_.tets();
     std::vector<int32_t> originals;
-    for (const int32_t v : VerticesOfSheet()) Double(v, &tets, &originals);
+    for (const int32_t v : VerticesOfSheet()) {
+      if (stays_joined.empty() || !stays_joined[static_cast<size_t>(v)]) {
+        Double(v, &tets, &originals);
+      }
+    }
     if (originals.empty()) {
       return absl::InvalidArgumentError(
           "the seam lies within the tissue and opens nowhere; correct its line");
@@ -168,8 +172,9 @@ class Parting {
 
 }  // namespace
 
-absl::StatusOr<PartedMesh> PartMesh(const TetMesh& mesh, const std::vector<int8_t>& side) {
-  return Parting(mesh, side).Run();
+absl::StatusOr<PartedMesh> PartMesh(const TetMesh& mesh, const std::vector<int8_t>& side,
+                                    const std::vector<bool>& stays_joined) {
+  return Parting(mesh, side).Run(stays_joined);
 }
 
 }  // namespace tissueform

@@ -49,9 +49,11 @@ struct PartedMesh {
 };
 
 // Parts a mesh along the facets between what lies above and below its sheet. A vertex is doubled
-// where they separate the tets about it; those on the rim of the sheet within the mesh are not.
+// where they separate the tets about it; those on the rim of the sheet within the mesh are not, nor
+// are those that `stays_joined` names (#V, or empty: none).
 //
 // REQUIRES: one side a vertex. Errors: InvalidArgument when nothing is parted.
-absl::StatusOr<PartedMesh> PartMesh(const TetMesh& mesh, const std::vector<int8_t>& side);
+absl::StatusOr<PartedMesh> PartMesh(const TetMesh& mesh, const std::vector<int8_t>& side,
+                                    const std::vector<bool>& stays_joined = {});
 
 }  // namespace tissueform

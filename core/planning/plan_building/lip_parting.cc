@@ -11,9 +11,11 @@
 #include <Eigen/Geometry>
 
 #include "core/base/status_macros.h"
-#include "core/imaging/anatomy/skin_regions.h"
+#include "core/imaging/anatomy/grid_operations.h"
+#include "core/imaging/anatomy/osteotomy.h"
 #include "core/imaging/anatomy/soft_tissue.h"
 #include "core/mesh/seam/seam_sheet.h"
+#include "core/mesh/skin_region.h"
 #include "core/mesh/tet_topology.h"
 
 namespace tissueform {
@@ -30,47 +32,29 @@ constexpr double kBehindFrontMm = 4;
 // How far from a vertex the voxel of the jaw is looked for that it lies on.
 constexpr int kSearchVoxels = 3;
 
-// Normals of the boundary at its vertices, out of the tissue, of length 1 or 0; #V by 3.
-Positions BoundaryNormals(const TetMesh& mesh) {
-  Positions normals = Positions::Zero(mesh.num_vertices(), 3);
-  const Positions& at = mesh.positions();
-  const TriangleIndices facets = BoundaryFacets(mesh);
+// Normals of facets at their vertices, weighted by area, of length 1 or 0; one row for each of
+// `positions`.
+Positions NormalsOf(const TriangleIndices& facets, const Positions& positions) {
+  Positions normals = Positions::Zero(positions.rows(), 3);
   for (const auto& facet : facets.rowwise()) {
-    const Eigen::Vector3d from = at.row(facet[0]);
-    const Eigen::Vector3d to_second = at.row(facet[1]).transpose() - from;
-    const Eigen::Vector3d to_third = at.row(facet[2]).transpose() - from;
-    const Eigen::RowVector3d twice_area = to_second.cross(to_third).transpose();
-    for (const int32_t v : facet) normals.row(v) += twice_area;
+    const Eigen::Vector3d from = positions.row(facet[0]);
+    const Eigen::Vector3d to_second = positions.row(facet[1]).transpose() - from;
+    const Eigen::Vector3d to_third = positions.row(facet[2]).transpose() - from;
+    for (const int32_t v : facet) normals.row(v) += to_second.cross(to_third).transpose();
   }
   normals.rowwise().normalize();
   return normals;
 }
 
-// The value at the nearest voxel within kSearchVoxels that `wanted` likes; 0 where there is no such
-// voxel.
-template <typename Wanted>
-uint8_t NearestLabel(const LabelGrid& labels, const Eigen::Vector3d& place, Wanted wanted) {
-  const Eigen::Vector3d at = labels.geometry.ToVoxels(place);
-  const Eigen::Vector3i centre = at.array().round().cast<int>();
-  uint8_t nearest = 0;
-  double smallest = kSearchVoxels + 1.0;
-  for (int z = centre.z() - kSearchVoxels; z <= centre.z() + kSearchVoxels; ++z) {
-    for (int y = centre.y() - kSearchVoxels; y <= centre.y() + kSearchVoxels; ++y) {
-      for (int x = centre.x() - kSearchVoxels; x <= centre.x() + kSearchVoxels; ++x) {
-        if (!labels.geometry.Contains(x, y, z) || !wanted(labels.At(x, y, z))) continue;
-        const double distance = (Eigen::Vector3d(x, y, z) - at).norm();
-        if (distance < smallest) {
-          smallest = distance;
-          nearest = labels.At(x, y, z);
-        }
-      }
-    }
-  }
-  return nearest;
-}
-
 bool IsBoneLabel(uint8_t label) { return label != 0 && label != kSoftTissue; }
-bool IsJaw(uint8_t part) { return part == kCranium || part == kMandible; }
+
+// kCranium or kMandible, or 0 where neither is near.
+uint8_t JawNear(const LabelGrid& parts, const Eigen::Vector3d& place) {
+  const auto voxel = NearestVoxel(parts, place, kSearchVoxels, [](uint8_t part) {
+    return part == kCranium || part == kMandible;
+  });
+  return voxel ? parts.At(voxel->x(), voxel->y(), voxel->z()) : 0;
+}
 
 // What of a jaw lies at a vertex, or before it.
 struct JawAt {
@@ -87,7 +71,21 @@ class ContactRows {
         anatomy_(anatomy),
         mesh_(mesh),
         regions_(regions),
-        normals_(BoundaryNormals(mesh)) {}
+        normals_(NormalsOf(BoundaryFacets(mesh), mesh.positions())) {}
+
+  // Vertices on the seam that are held by bone and touch it in no row, such as those behind a
+  // tooth. They stay one, as a row would take them from the bone.
+  std::vector<bool> StayJoined(const std::vector<int8_t>& side) const {
+    std::vector<bool> stay(side.size(), false);
+    for (Eigen::Index v = 0; v < mesh_.num_vertices(); ++v) {
+      const auto at = static_cast<size_t>(v);
+      if (side[at] != 0 || regions_.anatomy[at] == 0) continue;
+      std::vector<ContactRow> rows;
+      AddBoneRow(v, 1, &rows);
+      stay[at] = rows.empty();
+    }
+    return stay;
+  }
 
   // `side` of every vertex of the welded mesh.
   std::vector<ContactRow> Run(const std::vector<int8_t>& side, const PartedMesh& parted) const {
@@ -122,7 +120,7 @@ class ContactRows {
   JawAt BoneUnder(Eigen::Index v) const {
     const Eigen::Vector3d place = mesh_.positions().row(v);
     const uint8_t bone = regions_.bone[static_cast<size_t>(v)];
-    if (bone != 0) return {.bone = bone, .jaw = NearestLabel(anatomy_.parts, place, IsJaw)};
+    if (bone != 0) return {.bone = bone, .jaw = JawNear(anatomy_.parts, place)};
     return regions_.on_skin[static_cast<size_t>(v)] ? BoneBehindAir(v, place) : JawAt{};
   }
 
@@ -137,9 +135,7 @@ class ContactRows {
       if (!geometry.Contains(voxel.x(), voxel.y(), voxel.z())) return {};
       const uint8_t label = anatomy_.soft_tissue.At(voxel.x(), voxel.y(), voxel.z());
       if (!IsBoneLabel(label)) continue;
-      return {.bone = label,
-              .jaw = NearestLabel(anatomy_.parts, ahead, IsJaw),
-              .gap_mm = gap_mm - step_mm};
+      return {.bone = label, .jaw = JawNear(anatomy_.parts, ahead), .gap_mm = gap_mm - step_mm};
     }
     return {};
   }
@@ -165,20 +161,13 @@ class ContactRows {
   }
 
   void AddLipRows(const PartedMesh& parted, std::vector<ContactRow>* rows) const {
-    Positions up = Positions::Zero(mesh_.num_vertices(), 3);
-    const Positions& at = mesh_.positions();
-    for (const auto& facet : parted.wall.rowwise()) {
-      const Eigen::Vector3d from = at.row(facet[0]);
-      const Eigen::Vector3d to_second = at.row(facet[1]).transpose() - from;
-      const Eigen::Vector3d to_third = at.row(facet[2]).transpose() - from;
-      for (const int32_t v : facet) up.row(v) += to_second.cross(to_third).transpose();
-    }
+    const Positions up = NormalsOf(parted.wall, mesh_.positions());
     for (size_t k = 0; k < parted.original_of_double.size(); ++k) {
       const int32_t original = parted.original_of_double[k];
       rows->push_back(
           {.vertex = original,
            .other = static_cast<int32_t>(mesh_.num_vertices()) + static_cast<int32_t>(k),
-           .normal = up.row(original).transpose().normalized()});
+           .normal = up.row(original)});
     }
   }
 
@@ -258,9 +247,10 @@ absl::StatusOr<SeamInMesh> PutSeamInMesh(LipSeam seam, SoftTissueMesh* made) {
 
 absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnatomy& anatomy,
                                     SoftTissueMesh* made, PlanningRegions* regions) {
-  TF_ASSIGN_OR_RETURN(PartedMesh parted, PartMesh(made->mesh, seam.side));
-  std::vector<ContactRow> rows =
-      ContactRows(seam.seam, anatomy, made->mesh, *regions).Run(seam.side, parted);
+  const ContactRows contact_rows(seam.seam, anatomy, made->mesh, *regions);
+  TF_ASSIGN_OR_RETURN(PartedMesh parted,
+                      PartMesh(made->mesh, seam.side, contact_rows.StayJoined(seam.side)));
+  std::vector<ContactRow> rows = contact_rows.Run(seam.side, parted);
   NameLips(seam.seam, made->mesh, regions);
   AppendDoubles(parted.original_of_double, regions);
   made->mesh = std::move(parted.mesh);

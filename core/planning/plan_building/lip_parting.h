@@ -75,6 +75,7 @@ struct VestibuleAnatomy {
 //  * tissue on bone of the other jaw may lift off it (unilateral);
 //  * tissue with up to 5 mm of air before a jaw may meet it (unilateral, with that gap);
 //  * a vertex of the seam and its double may lift off each other (unilateral).
+// Bone behind the teeth holds what it held: its vertices on the seam stay one.
 // Normals of bone are those of its dental arch, laid into the plane square to `up`: with normals
 // turned up at the incisors' edges tissue slips off them.
 absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnatomy& anatomy,

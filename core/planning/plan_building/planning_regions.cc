@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -54,24 +53,12 @@ bool IsAir(const PlanningCt& ct, const Eigen::Vector3d& place) {
 
 // The label of the nearest voxel that is no soft tissue; air where there is none near by.
 uint8_t NearestOther(const Eigen::Vector3d& place, const LabelGrid& labels, const PlanningCt& ct) {
-  const Eigen::Vector3d at = labels.geometry.ToVoxels(place);
-  const Eigen::Vector3i centre = at.array().round().cast<int>();
-  uint8_t nearest = kAir;
-  double smallest = std::numeric_limits<double>::infinity();
-  for (int z = centre.z() - kSearchVoxels; z <= centre.z() + kSearchVoxels; ++z) {
-    for (int y = centre.y() - kSearchVoxels; y <= centre.y() + kSearchVoxels; ++y) {
-      for (int x = centre.x() - kSearchVoxels; x <= centre.x() + kSearchVoxels; ++x) {
-        if (!labels.geometry.Contains(x, y, z)) continue;
-        const uint8_t label = labels.At(x, y, z);
-        const double distance = (Eigen::Vector3d(x, y, z) - at).squaredNorm();
-        if (label != kSoftTissue && distance < smallest) {
-          smallest = distance;
-          nearest = label != kAir || IsAir(ct, labels.geometry.Centre(x, y, z)) ? label : kLeftOut;
-        }
-      }
-    }
-  }
-  return nearest;
+  const auto voxel = NearestVoxel(labels, place, kSearchVoxels,
+                                  [](uint8_t label) { return label != kSoftTissue; });
+  if (!voxel) return kAir;
+  const uint8_t label = labels.At(voxel->x(), voxel->y(), voxel->z());
+  const Eigen::Vector3d centre = labels.geometry.Centre(voxel->x(), voxel->y(), voxel->z());
+  return label != kAir || IsAir(ct, centre) ? label : kLeftOut;
 }
 
 std::vector<uint8_t> TouchedBy(const TetMesh& mesh, Eigen::Index boundary_vertices,

@@ -188,6 +188,19 @@ TEST(SeamTest, OriginalsLieAboveAndTheWallFacesUp) {
   }
 }
 
+TEST(SeamTest, VerticesThatStayJoinedAreNotDoubled) {
+  const auto [bar, boundary_vertices] = JitteredBar(2);
+  ASSERT_OK_AND_ASSIGN(const SeamedMesh seamed,
+                       ConformToSheet(bar, boundary_vertices, WavySheet(12)));
+  ASSERT_OK_AND_ASSIGN(const PartedMesh all, PartMesh(seamed.mesh, seamed.side));
+  std::vector<bool> stays_joined(seamed.side.size(), false);
+  const int32_t joined = all.original_of_double[all.original_of_double.size() / 2];
+  stays_joined[static_cast<size_t>(joined)] = true;
+  ASSERT_OK_AND_ASSIGN(const PartedMesh parted, PartMesh(seamed.mesh, seamed.side, stays_joined));
+  EXPECT_EQ(parted.original_of_double.size() + 1, all.original_of_double.size());
+  EXPECT_THAT(parted.original_of_double, ::testing::Not(::testing::Contains(joined)));
+}
+
 TEST(SeamTest, ASheetThatPartsNothingIsRefused) {
   const auto [bar, boundary_vertices] = JitteredBar(1);
   EXPECT_THAT(ConformToSheet(bar, boundary_vertices, WavySheet(-1)).status().message(),
