@@ -120,7 +120,8 @@ TEST_F(ContactSessionsTest, AnswersAreThoseOfThisProcessToTheLastBit) {
                          client->DeformOnce(session.name(), TopPose(pose)));
     EXPECT_EQ(answer.positions(), Float32Bytes(expected.positions));
     ASSERT_TRUE(answer.summary().has_contact());
-    EXPECT_EQ(ToContactSummary(answer.summary().contact()), SummarizeContact(expected.contact));
+    EXPECT_EQ(ToContactSummary(answer.summary().contact()),
+              SummarizeContact(expected.contact, problem.deformer.model));
     pressing += answer.summary().contact().pressing_row_count();
   }
   EXPECT_GT(pressing, 0);
