@@ -129,8 +129,9 @@ class ContactRows {
     const GridGeometry& geometry = anatomy_.soft_tissue.geometry;
     const Eigen::Vector3d outward = normals_.row(v);
     const double step_mm = geometry.spacing_mm / 4;
-    for (double gap_mm = step_mm; gap_mm <= kWidestGapMm; gap_mm += step_mm) {
-      const Eigen::Vector3d ahead = place + gap_mm * outward;
+    const auto steps = static_cast<int>(kWidestGapMm / step_mm);
+    for (int step = 1; step <= steps; ++step) {
+      const Eigen::Vector3d ahead = place + step * step_mm * outward;
       const Eigen::Vector3i voxel = geometry.ToVoxels(ahead).array().round().cast<int>();
       if (!geometry.Contains(voxel.x(), voxel.y(), voxel.z())) return {};
       const uint8_t label = anatomy_.soft_tissue.At(voxel.x(), voxel.y(), voxel.z());

@@ -21,7 +21,7 @@ using testing::StatusIs;
 
 constexpr double kUpperFrontMm = 50;
 constexpr double kLowerFrontMm = 48;
-constexpr double kHalfWidthMm = 25;
+constexpr int kHalfWidthMm = 25;
 
 double ArchFront(double foremost, double left) { return foremost - left * left / 20; }
 double SkinFront(double left) { return 62 - left * left / 30; }
@@ -60,7 +60,7 @@ LabelGrid MadeParts(bool with_lower_jaw = true) {
 
 MouthLine MadeLine() {
   std::vector<Eigen::Vector3d> places;
-  for (double left = -kHalfWidthMm; left <= kHalfWidthMm; ++left) {
+  for (int left = -kHalfWidthMm; left <= kHalfWidthMm; ++left) {
     places.emplace_back(left, -SkinFront(left), LineUp(left));
   }
   return *MouthLineThrough(places, MadeLandmarks());
@@ -84,7 +84,8 @@ TEST_F(LipSeamTest, RunsFromTheMouthLineToTheEdgeOfTheUpperTeeth) {
 TEST_F(LipSeamTest, IsContinuousFarBeyondTheCorners) {
   for (const double front : {20.0, 45.0, 58.0, 80.0}) {
     double before = seam_.HeightMm({-60, -front, 1});
-    for (double left = -60; left <= 60; left += 0.01) {
+    for (int step = -6000; step <= 6000; ++step) {
+      const double left = step * 0.01;
       const double height = seam_.HeightMm({left, -front, 1});
       ASSERT_LT(std::abs(height - before), 0.02) << left << " " << front;
       before = height;
@@ -126,13 +127,13 @@ TEST(LipSeamCreationTest, AJawThatShowsNoFrontIsNamed) {
 
 TEST(DentalArchTest, LeavesOutWhatLiesFarOff) {
   std::vector<Eigen::Vector2d> points;
-  for (double left = -27; left <= 27; left += 3) {
+  for (int left = -27; left <= 27; left += 3) {
     points.emplace_back(left, ArchFront(kUpperFrontMm, left));
   }
   points[4].y() -= 90;  // the spine, where a tooth is missing
   points[13].y() += 6;  // a bracket
   ASSERT_OK_AND_ASSIGN(const DentalArch arch, DentalArch::Fit(points));
-  for (double left = -27; left <= 27; left += 1) {
+  for (int left = -27; left <= 27; ++left) {
     EXPECT_NEAR(arch.FrontOf(left), ArchFront(kUpperFrontMm, left), 0.5) << left;
   }
   // Beyond the fitted width it goes on straight.
@@ -142,7 +143,7 @@ TEST(DentalArchTest, LeavesOutWhatLiesFarOff) {
 
 TEST(DentalArchTest, NeedsBothSides) {
   std::vector<Eigen::Vector2d> points;
-  for (double left = -27; left <= 9; left += 2) points.emplace_back(left, 50);
+  for (int left = -27; left <= 9; left += 2) points.emplace_back(left, 50);
   EXPECT_FALSE(DentalArch::Fit(points).ok());
   EXPECT_FALSE(DentalArch::Fit({{-20, 40}, {0, 50}, {20, 40}}).ok());
 }
