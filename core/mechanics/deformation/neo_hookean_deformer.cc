@@ -403,8 +403,10 @@ class NeoHookeanDeformer : public Deformer {
     TF_RETURN_IF_ERROR(contact_->Close(std::move(closed)));
     const Positions displacements = search_.displacements();
     TF_ASSIGN_OR_RETURN(const Positions correction, contact_->Correction(displacements));
-    for (double part = 1; part >= kSmallestCorrection; part *= 0.5) {
+    double part = 1;
+    while (part >= kSmallestCorrection) {
       if (search_.Start(displacements + part * correction)) return true;
+      part *= 0.5;
     }
     TF_RETURN_IF_ERROR(contact_->Close(before));
     return false;
