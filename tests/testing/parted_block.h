@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "core/mechanics/constraints/constraint_set.h"
@@ -50,6 +51,7 @@ class PartedBlock {
   static std::vector<int32_t> Top() { return {36, 37, 38, 39, 40, 41, 42, 43, 44}; }
   static std::vector<ContactRow> Slides() {
     std::vector<ContactRow> rows;
+    rows.reserve(std::size(kSliding) + 1);
     for (const int32_t vertex : kSliding) {
       rows.push_back({.vertex = vertex, .normal = Eigen::Vector3d::UnitX(), .bilateral = true});
     }

@@ -74,11 +74,13 @@ absl::Status CheckOut(const PlanFitOptions& options) {
 
 absl::Status CheckModel(const Plan& plan, const ConstraintSet& constraints) {
   if (!HasPreparedAnswers(plan.model, plan.gradient_field, constraints)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "model ", ModelName(plan.model),
-        ", with the plan's settings, has no prepared answers, which fitting needs; use "
-        "--model with ",
-        ModelsWithPreparedAnswers(constraints)));
+    const bool has_contact = !constraints.contact().empty();
+    const bool by_settings = !has_contact && plan.model == DeformationModel::kGradientField;
+    return absl::InvalidArgumentError(
+        absl::StrCat("model ", ModelName(plan.model), by_settings ? " with these settings" : "",
+                     has_contact ? " with contact" : "",
+                     " has no prepared answers, which fitting needs; use --model ",
+                     ModelsWithPreparedAnswers(constraints)));
   }
   const bool is_scaled = std::any_of(plan.handles.begin(), plan.handles.end(),
                                      [](const PlannedHandle& h) { return h.pose.scale != 1; });
