@@ -136,7 +136,7 @@ class ContactRows {
       if (!geometry.Contains(voxel.x(), voxel.y(), voxel.z())) return {};
       const uint8_t label = anatomy_.soft_tissue.At(voxel.x(), voxel.y(), voxel.z());
       if (!IsBoneLabel(label)) continue;
-      return {.bone = label, .jaw = JawNear(anatomy_.parts, ahead), .gap_mm = gap_mm - step_mm};
+      return {.bone = label, .jaw = JawNear(anatomy_.parts, ahead), .gap_mm = (step - 1) * step_mm};
     }
     return {};
   }
