@@ -10,7 +10,7 @@ and with all source files by themselves. Prints a line for each batch: its file,
 
 Files come together when their commands give no macro two values and when, as far as the first words of their lines
 tell, they name nothing the same, and nothing that a header of the other names: names of unnamed namespaces must meet
-neither each other nor a header's. A batch that does not compile all the same is the caller's to take apart.
+neither each other nor a header's. A batch that still does not compile is the caller's to take apart.
 """
 
 import functools

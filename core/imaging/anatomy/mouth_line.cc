@@ -26,6 +26,7 @@ constexpr double kSureShare = 0.8;
 // Limits of a line that a person gives.
 constexpr double kGivenStepMm = 0.5;
 constexpr double kGivenHalfWidthMm = 45;
+constexpr double kGivenHeightMm = 25;
 
 // The red of a lip is about 8 mm high: the lip's foremost skin is no farther from the line.
 constexpr double kLipHeightMm = 8;
@@ -468,6 +469,14 @@ absl::StatusOr<MouthLine> MouthLineThrough(const std::vector<Eigen::Vector3d>& p
           "point %d of the mouth line lies %.1f mm left of the midline; give points from the right "
           "corner to the left one, %g mm or more apart and within %g mm of the midline",
           line.points.size(), at.left, kGivenStepMm, kGivenHalfWidthMm));
+    }
+    const double over_incisors_mm = at.up - axes.Of(landmarks.upper_incisor).up;
+    if (!(std::abs(over_incisors_mm) <= kGivenHeightMm)) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("point %d of the mouth line lies %.1f mm over the edge of the upper "
+                          "incisors; give points "
+                          "between the lips, within %g mm of it (LPS, mm)",
+                          line.points.size(), over_incisors_mm, kGivenHeightMm));
     }
     line.points.push_back({.at = at});
   }

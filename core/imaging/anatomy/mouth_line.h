@@ -79,7 +79,7 @@ absl::StatusOr<MouthLine> FindMouthLine(const HeadSegmentation& head, const Land
 // A line that a person gives, LPS, from right to left.
 //
 // Errors: InvalidArgument unless each of its points, three or more, lies 0.5 mm or more left of the
-// one before and all lie within 45 mm of the midline.
+// one before and all lie within 45 mm of the midline and 25 mm of the upper incisors' height.
 absl::StatusOr<MouthLine> MouthLineThrough(const std::vector<Eigen::Vector3d>& places_mm,
                                            const Landmarks& landmarks);
 

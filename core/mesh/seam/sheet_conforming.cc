@@ -152,7 +152,7 @@ class Conforming {
     }
   }
 
-  // Each child keeps one end of the edge, so no tet ever lies in the sheet with all its vertices,
+  // Each child keeps one end of the edge, so every tet keeps a vertex beside the sheet,
   // and no new edge crosses it.
   void Split(const Crossing& crossing) {
     const auto added = static_cast<int32_t>(places_.size());

@@ -135,12 +135,16 @@ absl::StatusOr<RecipeMesh> ToMesh(const Json& json) {
   return mesh;
 }
 
-RecipeLips ToLips(const Json& json) {
+absl::StatusOr<RecipeLips> ToLips(const Json& json) {
   RecipeLips lips;
   lips.part = json.value("part", lips.part);
   lips.vestibule_mm = json.value("vestibule_mm", lips.vestibule_mm);
   for (const Json& place : json.value("mouth_line_mm", Json::array())) {
     lips.mouth_line_mm.push_back(VectorFromJson(place));
+  }
+  if (!lips.part && !lips.mouth_line_mm.empty()) {
+    return absl::InvalidArgumentError(
+        "mouth_line_mm at /lips has no use unless \"part\" is true; set it, or leave the line out");
   }
   return lips;
 }
@@ -182,7 +186,7 @@ absl::StatusOr<Recipe> ToRecipe(const Json& json) {
   TF_RETURN_IF_ERROR(ReadHeadFrame(json.value("head_frame", nothing), &recipe));
   recipe.soft_tissue = ToSoftTissue(json.value("soft_tissue", nothing));
   TF_ASSIGN_OR_RETURN(recipe.mesh, ToMesh(json.value("mesh", nothing)));
-  recipe.lips = ToLips(json.value("lips", nothing));
+  TF_ASSIGN_OR_RETURN(recipe.lips, ToLips(json.value("lips", nothing)));
   if (json.contains("contact_band_mm")) {
     recipe.contact_band_mm = json.at("contact_band_mm").get<double>();
   }

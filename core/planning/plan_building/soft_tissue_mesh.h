@@ -69,7 +69,7 @@ struct SoftTissueMesh {
   SoftTissueMeshReport report;
 };
 
-// Measures anew what the report says of the tets and the surface's vertices, for a mesh that was
+// Measures again what the report says of the tets and the surface's vertices, for a mesh that was
 // changed.
 void MeasureTets(SoftTissueMesh* made);
 

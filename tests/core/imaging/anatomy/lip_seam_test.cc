@@ -164,6 +164,8 @@ TEST(GivenMouthLineTest, RunsFromRightToLeftWithinAMouth) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("point 2")));
   EXPECT_FALSE(status_of({{22, -52, 1}, {0, -60, 3}, {-25, -50, 1}}).ok());
   EXPECT_FALSE(status_of({{-60, -50, 1}, {0, -60, 3}, {22, -52, 1}}).ok());
+  EXPECT_THAT(status_of({{-25, -50, 1}, {0, -60, 39}, {22, -52, 1}}),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("point 1")));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(status_of({{-25, -50, 1}, {nan, -60, 3}, {22, -52, 1}}).ok());
 }

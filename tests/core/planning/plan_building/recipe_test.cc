@@ -137,6 +137,8 @@ TEST(RecipeTest, LipsAreOfVersion4) {
   EXPECT_THAT(parse("3", R"({"part": true})"), StatusIs(kInvalid, HasSubstr("lips")));
   EXPECT_THAT(parse("4", R"({"mouth_line_mm": [[0, 0, 0]]})"),
               StatusIs(kInvalid, HasSubstr("/lips/mouth_line_mm")));
+  EXPECT_THAT(parse("4", R"({"mouth_line_mm": [[-25, 1, 2], [0, 0, 3], [25, 1, 2]]})"),
+              StatusIs(kInvalid, HasSubstr("unless \"part\" is true")));
   EXPECT_THAT(parse("4", R"({"vestibule_mm": 50})"),
               StatusIs(kInvalid, HasSubstr("/lips/vestibule_mm")));
 }
