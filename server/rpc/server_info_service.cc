@@ -19,6 +19,7 @@ void AddModel(const ModelTraits& traits, v1::ServerInfo* info) {
   proto->set_name(std::string(traits.name));
   proto->set_iterates(traits.iterates);
   proto->set_has_prepared_answers(traits.has_prepared_answers);
+  proto->set_has_prepared_contact(traits.has_prepared_contact);
 }
 
 // Those that a request may name: conversion decides, not a second list.

@@ -11,25 +11,27 @@ import { Code, messageOf, toCallError } from "./calls/call_error";
 import { Gateway, baseOf } from "./calls/gateway";
 import { type CaseFile, openCase } from "./case/case_file";
 import { serverSource } from "./case/case_sources";
+import { stickingCase } from "./case/sticking_case";
 import type { ModelInfo } from "./generated/tissueform/v1/server_info_pb";
 import { isLinkToken } from "./live/follow_links";
-import { Login } from "./login/login";
+import type { Login } from "./login/login";
 import { fetchLoginConfig } from "./login/login_config";
-import { OidcProvider } from "./login/provider";
 import { casesPage } from "./pages/cases_page";
 import { LINK_HAS_ENDED, followerPage } from "./pages/follower_page";
+import { pagePart } from "./panels/page_part";
 import { plannerPage } from "./pages/planner_page";
 import { signInPage } from "./pages/sign_in_page";
 import { accountBox, loginBanner } from "./panels/account_box";
 import { button, el } from "./panels/dom";
 import { formatProgress } from "./planning/numbers";
-import { restoreWork, workOf } from "./workbench/work";
+import { carryWork, restoreWork, takeCarriedWork, workOf } from "./workbench/work";
 import type { Workbench } from "./workbench/workbench";
 
 // What stands behind the # says which page this is:
 //
 //   nothing                            the list of cases
 //   #case={sha256}                     the planner of a case
+//   #case={sha256}&contact=off         the same, where tissue sticks and lips are one piece; so with followers
 //   #follow={session}&case={sha256}    read-only, beside somebody who plans; where the server has logins, the link's token
 //                                      stands in the session's place, and nobody needs to sign in
 
@@ -63,7 +65,8 @@ async function start(): Promise<void> {
 async function signIn(): Promise<boolean> {
   const config = await fetchLoginConfig(base);
   if (config === null) return true;
-  const user = new Login(new OidcProvider(config), config.issuer, gateway.bearer);
+  const { oidcLogin } = await pagePart(() => import("./login/oidc_login"));
+  const user = oidcLogin(config, gateway.bearer);
   login = user;
   banner = loginBanner(user, () => (hook.bench === undefined ? null : workOf(hook.bench)));
   user.watch((state) => {
@@ -74,9 +77,9 @@ async function signIn(): Promise<boolean> {
   return user.state.kind === "in";
 }
 
-function parameters(): { caseId: string; follow: string } {
+function parameters(): { caseId: string; follow: string; sticks: boolean } {
   const all = new URLSearchParams(location.hash.slice(1));
-  return { caseId: all.get("case") ?? "", follow: all.get("follow") ?? "" };
+  return { caseId: all.get("case") ?? "", follow: all.get("follow") ?? "", sticks: all.get("contact") === "off" };
 }
 
 async function route(): Promise<void> {
@@ -106,14 +109,22 @@ function go(caseId: string): void {
 
 async function openPlanner(name: string): Promise<void> {
   const [file, models, hasLogins] = await Promise.all([fetchCase(name), fetchModels(), knowsCallers()]);
-  const followUrl = (follow: string) => `${base}/#follow=${follow}&case=${name.replace("cases/", "")}`;
-  const parts = { followUrl, hasLogins, account: account() };
+  const caseId = name.replace("cases/", "");
+  const suffix = file.parted === null ? "" : "&contact=off";
+  const followUrl = (follow: string) => `${base}/#follow=${follow}&case=${caseId}${suffix}`;
+  const chooseContact = async (sticks: boolean) => {
+    carryWork(bench);
+    await bench.live.end();
+    location.hash = `case=${caseId}${sticks ? "&contact=off" : ""}`;
+  };
+  const parts = { followUrl, hasLogins, account: account(), chooseContact };
   const { element, bench } = plannerPage(gateway, file, name, models, parts, () => (location.hash = ""));
   hook.bench = bench;
   hook.view = bench.view;
   show(element);
   await bench.start();
   if (login !== null) restoreWork(bench, login.work);
+  restoreWork(bench, takeCarriedWork());
 }
 
 function openFollower(file: CaseFile, session: string, endsAt: Date | null): void {
@@ -155,7 +166,9 @@ async function fetchCase(name: string): Promise<CaseFile> {
     bar.value = done / total;
     told.textContent = formatProgress(done, total);
   };
-  return openCase(serverSource(gateway, entry), onProgress);
+  const file = await openCase(serverSource(gateway, entry), onProgress);
+  // A case that has no contact sticks anyway.
+  return parameters().sticks && file.sessionRequest.contact.length > 0 ? stickingCase(file) : file;
 }
 
 async function fetchModels(): Promise<readonly ModelInfo[]> {

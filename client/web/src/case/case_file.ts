@@ -41,9 +41,14 @@ export interface CaseFile {
   probes: ([number, number, number] | null)[];
   /** Of all vertices of the tet mesh, #V by 3, at rest, rounded to float32 as frames are. */
   restPositions: Float32Array;
-  /** Where the bytes for UploadMesh lie in `source`. */
+  /** Where the bytes for UploadMesh lie in `meshSource`. */
   meshPayload: Range;
+  meshSource: CaseSource;
   source: CaseSource;
+  /** Without contact these vertices stick, in pairs: a vertex, rising, and what it sticks to (-1: fixed, else an index of the request's handles). */
+  sticking: Int32Array;
+  /** Of stickingCase the case whose lips were joined; else null. */
+  parted: CaseFile | null;
 }
 
 /** How many of the bytes that are read have come. */
@@ -119,7 +124,10 @@ function build(source: CaseSource, manifest: Manifest, container: Container, vie
     probes,
     restPositions,
     meshPayload: payload,
+    meshSource: source,
     source,
+    sticking: readSticking(manifest, sessionRequest, views),
+    parted: null,
   };
 }
 
@@ -190,7 +198,21 @@ function readRequest(manifest: Manifest, views: Views): CreateSessionRequest {
   if (request.mesh !== manifest.mesh.name || names !== manifest.handles.map((handle) => handle.name).sort().join("\n")) {
     throw new CaseError("the case's session request has another mesh or other handles than the case");
   }
+  if (request.contact.length !== (manifest.contact?.rows ?? 0)) {
+    throw new CaseError(`the case's session request has ${request.contact.length} contact rows, and the case says ${manifest.contact?.rows ?? 0}`);
+  }
   return request;
+}
+
+function readSticking(manifest: Manifest, request: CreateSessionRequest, views: Views): Int32Array {
+  const index = manifest.contact?.sticking ?? null;
+  if (index === null) return new Int32Array();
+  const bytes = views.view(index);
+  const pairs = new Int32Array(bytes.slice(0, bytes.byteLength - (bytes.byteLength % 8)));
+  const isGood = (vertex: number, i: number) =>
+    i % 2 === 1 ? vertex >= -1 && vertex < request.handles.length : vertex > (i === 0 ? -1 : pairs[i - 2]) && vertex < manifest.mesh.vertexCount;
+  if (pairs.byteLength !== bytes.byteLength || !pairs.every(isGood)) throw new CaseError("the case's vertices that stick without contact are damaged: make the file again with tissueform case pack");
+  return pairs;
 }
 
 function readRanges(manifest: Manifest, views: Views): MaterialRanges | null {

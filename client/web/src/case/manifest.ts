@@ -48,6 +48,8 @@ export interface Manifest {
   mesh: { name: string; vertexCount: number; tetCount: number; cellArrays: string[]; payload: number };
   sessionRequest: number;
   materialRanges: number | null;
+  /** Null where all tissue sticks. `sticking`: a buffer view. */
+  contact: { rows: number; sticking: number | null } | null;
   model: string;
   surfaces: SurfaceEntry[];
   skinRegions: { number: number; name: string; label: string }[];
@@ -57,7 +59,8 @@ export interface Manifest {
 }
 
 const DEFAULT_LIMITS = { translationMm: 20, rotationDeg: 30 };
-const VERSION = 1;
+const VERSION = 2;
+const MAX_CONTACT_ROWS = 16384;
 const MAX_COUNT = 2 ** 31 - 1;
 
 /** Throws a CaseError that names the key. `views` and `meshes`: how many the file has. */
@@ -79,6 +82,7 @@ export function readManifest(root: Field, views: number, meshes: number): Manife
     mesh: readMesh(root.get("mesh"), view),
     sessionRequest: view(root.get("session_request")),
     materialRanges: optionalView(root.get("material_ranges")),
+    contact: readContact(root.get("contact"), optionalView),
     model: root.get("model").text(),
     surfaces: root.get("surfaces").list(MAX_SURFACES).map((surface) => readSurface(surface, view, meshes, names)),
     skinRegions: listOr(root.get("skin_regions"), 255).map((region) => ({
@@ -100,6 +104,11 @@ function readProvenance(field: Field): Record<string, string> {
   const keys = ["software", "commit", "created", "plan_sha256"];
   if (!field.isPresent) return {};
   return Object.fromEntries(keys.map((key) => [key, field.get(key).textOr("")]));
+}
+
+function readContact(field: Field, optionalView: (field: Field) => number | null): Manifest["contact"] {
+  if (!field.isPresent) return null;
+  return { rows: field.get("rows").integer(1, MAX_CONTACT_ROWS), sticking: optionalView(field.get("sticking")) };
 }
 
 function readMesh(field: Field, view: (field: Field) => number): Manifest["mesh"] {

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { CaseFile } from "../case/case_file";
-import { BlendMap, type GradientFieldSettings, Guidance, RotationMode } from "../generated/tissueform/v1/session_pb";
+import { withSticking } from "../case/sticking";
+import { BlendMap, type ContactRow, type GradientFieldSettings, Guidance, RotationMode } from "../generated/tissueform/v1/session_pb";
 import type { Pose } from "../geometry/pose";
 
 // A case as a plan (docs/plan-format.md). The case itself is the plan's mesh, and regions are numbers of its vertices.
@@ -14,26 +15,41 @@ export const CASE_FILE = "tissueform-case.tfcase";
 export type PlannedRanges = { youngs_modulus_factor_95: object; poisson_ratio_95?: number[] } | null;
 
 /** What `tissueform deform` needs. `poses` by handle; `model`: by its name in plans. */
-export function planOf(file: CaseFile, poses: ReadonlyMap<string, Pose>, model: string, ranges: PlannedRanges): object {
-  const { manifest, sessionRequest: request } = file;
+export function planOf(shown: CaseFile, poses: ReadonlyMap<string, Pose>, model: string, ranges: PlannedRanges): object {
+  // Without contact, too, the plan is of the mesh in the case file: `--contact off` joins its lips.
+  const file = shown.parted ?? shown;
+  const { manifest, sessionRequest: request, sticking } = file;
+  const hasContact = request.contact.length > 0;
   const source = request.stiffness?.source;
   const stiffnessArrays = source?.case === "cellArray" ? [source.value] : [];
   // Programs compute the digest of positions, tets and the stiffness; of a case with other arrays it is another one.
   const hasDigest = manifest.mesh.cellArrays.join("\n") === stiffnessArrays.join("\n");
   return {
     format: "tissueform-plan",
-    version: 3,
+    version: hasContact ? 4 : 3,
     unit: "mm",
     coordinate_system: "LPS",
     mesh: CASE_FILE,
     ...(hasDigest ? { mesh_sha256: manifest.mesh.name.replace("meshes/", "") } : {}),
     stiffness: source?.case === "uniformPa" ? { uniform: source.value } : { cell_data: source?.value },
     poisson_ratio: request.poissonRatio,
-    fixed: { vertices: request.fixedVertices },
-    handles: request.handles.map(({ name, vertices }) => ({ name, region: { vertices }, pose: poseJson(poses.get(name)) })),
+    fixed: { vertices: withSticking(request.fixedVertices, sticking, -1) },
+    handles: request.handles.map(({ name, vertices }, index) => ({ name, region: { vertices: withSticking(vertices, sticking, index) }, pose: poseJson(poses.get(name)) })),
+    ...(hasContact ? { contact: { rows: request.contact.map(rowJson) } } : {}),
     model,
     gradient_field: gradientFieldJson(request.gradientField),
     ...(ranges === null ? {} : { uncertainty: ranges }),
+  };
+}
+
+function rowJson({ vertex, other, normal, gapMm, bilateral }: ContactRow): object {
+  const keys = { handle: "handle", fixedBone: "fixed", otherVertex: "other_vertex" };
+  return {
+    vertex,
+    ...(other.case === undefined ? {} : { [keys[other.case]]: other.value }),
+    normal: [normal?.x ?? 0, normal?.y ?? 0, normal?.z ?? 0],
+    ...(gapMm === 0 ? {} : { gap_mm: gapMm }),
+    ...(bilateral ? { bilateral } : {}),
   };
 }
 
@@ -72,11 +88,11 @@ export async function plannedRanges(file: CaseFile): Promise<PlannedRanges> {
   };
 }
 
-async function readCellArray({ manifest, meshPayload, source }: CaseFile, name: string): Promise<Float64Array> {
+async function readCellArray({ manifest, meshPayload, meshSource }: CaseFile, name: string): Promise<Float64Array> {
   const { vertexCount, tetCount, cellArrays } = manifest.mesh;
   const index = cellArrays.indexOf(name);
   if (index < 0) return new Float64Array();
-  const bytes = await source.read(meshPayload.offset + 24 * vertexCount + 16 * tetCount + 8 * tetCount * index, 8 * tetCount);
+  const bytes = await meshSource.read(meshPayload.offset + 24 * vertexCount + 16 * tetCount + 8 * tetCount * index, 8 * tetCount);
   return new Float64Array(bytes.buffer, bytes.byteOffset, tetCount);
 }
 

@@ -8,11 +8,10 @@ import { evaluatorModule } from "../evaluation/evaluator_module";
 import type { Pose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import { type MovingData, writeMovingData } from "../movingdata/moving_data";
+import { LEAST_PASSWORD_LETTERS } from "../movingdata/password";
 import { TEMPLATE_FILE, fillTemplate } from "../movingdata/page_template";
 import { seal } from "../movingdata/sealed_payload";
 import { posesOfCase } from "../planning/plan";
-
-export const LEAST_PASSWORD_LETTERS = 8;
 
 /** What the file shows as planned, and by what it moves. */
 export interface MovingPlan {

@@ -71,7 +71,7 @@ export async function createSession(gateway: Gateway, file: CaseFile, stream: De
   } catch (thrown) {
     if (!isMissing(thrown, "MESH_NOT_FOUND")) throw thrown;
   }
-  await uploadMesh(gateway, file.source, file.meshPayload, file.manifest.mesh, (share) => onStage("Sending the mesh", share));
+  await uploadMesh(gateway, file.meshSource, file.meshPayload, file.manifest.mesh, (share) => onStage("Sending the mesh", share));
   return prepare(gateway, stream.session, request, onStage);
 }
 

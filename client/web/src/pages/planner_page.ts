@@ -7,6 +7,7 @@ import { FollowLinks } from "../live/follow_links";
 import { button, el, throttleToFrame } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
 import { jawPanel } from "../panels/jaw_panel";
+import { contactPart } from "../panels/contact_part";
 import { bindKeys, helpDialog } from "../panels/keyboard";
 import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
 import { measuresPanel } from "../panels/measures_panel";
@@ -42,6 +43,8 @@ export interface PageParts {
   /** Whether the server knows who calls: then links are of tokens that end. */
   hasLogins: boolean;
   account: HTMLElement | null;
+  /** Leaves for the same case with tissue that sticks, or with lips that part. */
+  chooseContact(sticks: boolean): Promise<void>;
 }
 
 /** The planner of one case. */
@@ -50,7 +53,7 @@ export function plannerPage(
   file: CaseFile,
   caseName: string,
   models: readonly ModelInfo[],
-  { followUrl, hasLogins, account }: PageParts,
+  { followUrl, hasLogins, account, chooseContact }: PageParts,
   onLeave: () => void,
 ): { element: HTMLElement; bench: Workbench } {
   const notice = noticeBox();
@@ -81,7 +84,7 @@ export function plannerPage(
     profilePanel(bench),
     targetPanel(bench),
     jawPanel(bench),
-    modelPanel(bench),
+    modelPanel(bench, contactPart(bench, chooseContact)),
     mapPanel(bench),
     predictionsPanel(bench),
     exportPanel(bench),

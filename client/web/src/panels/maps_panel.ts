@@ -28,8 +28,8 @@ export function modelText(name: string): ModelText {
   return MODELS[name] ?? { label: name, text: "" };
 }
 
-/** Which model answers, in words. */
-export function modelPanel(bench: Workbench): HTMLElement {
+/** Which model answers, in words. `contact`: contactPart. */
+export function modelPanel(bench: Workbench, contact: HTMLElement): HTMLElement {
   const name = newId("model");
   const items = bench.models.map((info) => {
     const { label, text } = modelText(info.name);
@@ -44,7 +44,7 @@ export function modelPanel(bench: Workbench): HTMLElement {
   };
   bench.answer.watch(throttleToFrame(show));
   bench.comparison.watch(throttleToFrame(show));
-  return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), answer, localAnswers(bench)]);
+  return section("Model", [el("div", { attributes: { role: "radiogroup", "aria-label": "Model" } }, items), contact, answer, localAnswers(bench)]);
 }
 
 /** Who answers the hand, and what stops or starts that. */

@@ -3,7 +3,8 @@
 
 import { messageOf } from "../calls/call_error";
 import { download } from "../exports/files";
-import { LEAST_PASSWORD_LETTERS, movingFile } from "../exports/moving_export";
+import { LEAST_PASSWORD_LETTERS } from "../movingdata/password";
+import { pagePart } from "./page_part";
 import type { Workbench } from "../workbench/workbench";
 import { button, el, newId, whileBusy } from "./dom";
 
@@ -19,6 +20,7 @@ export function movingFilePart(bench: Workbench): HTMLElement {
     if (answers === null) throw new Error("a moving file needs the model's columns in this page: choose a model with prepared answers, and wait until they are loaded");
     const model = bench.modelInfo(bench.model.value)?.name ?? "";
     const poses = bench.posesByHandle(bench.plan.poses());
+    const { movingFile } = await pagePart(() => import("../exports/moving_export"));
     download("tissueform-moves.html", await movingFile(bench.file, { poses, model, answers }, password.value));
     password.value = "";
   };

@@ -5,6 +5,7 @@ import type { MessageInitShape } from "@bufbuild/protobuf";
 import { toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
+import { firstAtPlace, keptCount } from "../case/sticking_case";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import type { FitRequestSchema, FitResponse } from "../generated/tissueform/v1/plan_service_pb";
 import type { ReadPositionsResponse } from "../generated/tissueform/v1/prediction_service_pb";
@@ -70,12 +71,24 @@ export class Answers {
   async ofPrediction(prediction: Prediction): Promise<Float32Array> {
     const known = this.kept.get(prediction.name);
     if (known !== undefined) return known;
-    const total = 12 * this.file.manifest.mesh.vertexCount;
+    const vertices = this.verticesIn(prediction);
+    const total = 12 * Number(prediction.vertexCount);
     const bytes = await this.call(() => collect(this.gateway.predictions.readPositions({ name: prediction.name }), total));
-    const displacements = this.displacements(pick(asFloatArray(bytes), this.file.followed));
+    const displacements = this.displacements(pick(asFloatArray(bytes), vertices));
     if (this.kept.size >= MOST_KEPT) this.kept.delete(this.kept.keys().next().value ?? "");
     this.kept.set(prediction.name, displacements);
     return displacements;
+  }
+
+  /** CaseFile.followed as the prediction's mesh numbers them: without contact it has no doubles of the seam. */
+  private verticesIn({ vertexCount }: Prediction): Int32Array {
+    const { file } = this;
+    const count = Number(vertexCount);
+    if (count === file.manifest.mesh.vertexCount) return file.followed;
+    if (count === file.parted?.manifest.mesh.vertexCount) throw new Error("the prediction was made where lips part and slide: choose that under Contact to compare it");
+    const first = firstAtPlace(file.restPositions, file.sessionRequest.contact);
+    if (count !== keptCount(first)) throw new Error("the prediction has a different mesh from the case");
+    return file.followed.map((vertex) => first[vertex]);
   }
 
   async remove(prediction: Prediction): Promise<void> {

@@ -18,6 +18,20 @@ export interface SavedPlan {
   posesByHandle(poses: readonly Pose[]): Map<string, Pose>;
 }
 
+const CARRIED_KEY = "tissueform-carried";
+
+/** Keeps the poses of this tab until the page that comes next takes them. */
+export function carryWork(bench: SavedPlan): void {
+  sessionStorage.setItem(CARRIED_KEY, JSON.stringify(workOf(bench)));
+}
+
+/** For restoreWork; null where nothing was carried. */
+export function takeCarriedWork(): unknown {
+  const text = sessionStorage.getItem(CARRIED_KEY);
+  sessionStorage.removeItem(CARRIED_KEY);
+  return JSON.parse(text ?? "null");
+}
+
 export function workOf(bench: SavedPlan): Work {
   return { caseName: bench.caseName, poses: Array.from(bench.posesByHandle(bench.plan.poses())) };
 }

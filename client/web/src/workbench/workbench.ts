@@ -138,7 +138,8 @@ export class Workbench implements ShownFace {
       onState: (state) => (this.localState.value = state),
       onEvaluation: (evaluation) => this.showLocal(evaluation),
     });
-    this.live = new LiveSession(gateway, file, caseName, {
+    // A session that sticks is of another mesh: it has a place of its own in what the browser remembers.
+    this.live = new LiveSession(gateway, file, file.parted === null ? caseName : `${caseName}#contact=off`, {
       onConnection: (connection) => (this.connection.value = connection),
       onPicture: (picture, used) => this.show(picture, used),
       onCommittedPoses: (poses) => this.plan.setPoses(poses),
@@ -194,6 +195,7 @@ export class Workbench implements ShownFace {
 
   /** Of what is shown, in words; empty where there is one, or none yet. */
   get whyNoBand(): string {
+    if (this.touches) return "not known where lips part and slide";
     if (!this.hasBand) return "this model or case has none";
     const turnsTooFar = Array.from(this.shownPoses.values()).some(({ rotationVector }) => Math.hypot(...rotationVector) > LARGEST_BAND_ROTATION);
     return this.shownBand === null && turnsTooFar ? "a segment turns by more than 30 degrees, which linear elasticity treats as strain" : "";
@@ -252,14 +254,20 @@ export class Workbench implements ShownFace {
   /** Poses of the bone as it is shown. */
   shownPoses: ReadonlyMap<string, Pose> = new Map();
 
+  /** Tissue slides and lips part: the case has contact rows, and they count. */
+  get touches(): boolean {
+    return this.file.sessionRequest.contact.length > 0;
+  }
+
   private knowsBand(model: DeformationModel): boolean {
+    if (this.touches) return false;
     const info = this.modelInfo(model);
     return this.file.materialRanges !== null && info !== undefined && info.hasPreparedAnswers && info.name !== "gradient_field";
   }
 
   private dragChoice() {
     const info = this.modelInfo(this.model.value);
-    const isPrepared = info?.hasPreparedAnswers ?? false;
+    const isPrepared = (this.touches ? info?.hasPreparedContact : info?.hasPreparedAnswers) ?? false;
     return { model: this.model.value, isPrepared, ranges: this.hasBand ? this.file.materialRanges : null };
   }
 

@@ -42,7 +42,7 @@ describe("a case", () => {
 
   test.each<[string, CaseChanges, string]>([
     ["another format", { json: (json) => (manifestOf(json).format = "other") }, "format"],
-    ["a later version", { json: (json) => (manifestOf(json).version = 2) }, "newer one"],
+    ["a later version", { json: (json) => (manifestOf(json).version = 3) }, "newer one"],
     ["no extension", { json: (json) => delete json.extensions }, "extensions"],
     ["a view past the end", { json: (json) => (json.bufferViews[0].byteLength = 1e9) }, "bufferViews[0].byteLength"],
     ["a view at a negative place", { json: (json) => (json.bufferViews[0].byteOffset = -4) }, "bufferViews[0].byteOffset"],

@@ -17,7 +17,7 @@ async function caseOf(stiffness: [number, number], arrays = ["tissue"]): Promise
   const file = await openCase(sourceOf(smallCase()));
   const bytes = new Uint8Array(new Float64Array(stiffness).buffer);
   const read = async (offset: number, length: number) => bytes.slice(offset - file.meshPayload.offset - STIFFNESS_OFFSET).subarray(0, length);
-  file.source = { totalBytes: 0, read };
+  file.meshSource = { totalBytes: 0, read };
   file.manifest.mesh.cellArrays = arrays;
   file.materialRanges = create(MaterialRangesSchema, { tissues: new Uint8Array([0, 1]), factors95: [1.8, 2.2], lowestPoissonRatio: 0.4, highestPoissonRatio: 0.48 });
   Object.assign(file.sessionRequest, {

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { createHash } from "node:crypto";
-import { create, toBinary } from "@bufbuild/protobuf";
+import { type MessageInitShape, create, toBinary } from "@bufbuild/protobuf";
+import type { ContactRowSchema } from "../../src/generated/tissueform/v1/session_pb";
 import { CreateSessionRequestSchema } from "../../src/generated/tissueform/v1/session_service_pb";
 import { HAND_MADE_FACE } from "./hand_made_face";
 import { concat, container, layOut } from "./small_case";
@@ -103,24 +104,61 @@ function meshName({ positions, tets }: Block, payload: Uint8Array): string {
   return `meshes/${createHash("sha256").update(text).update(payload).digest("hex")}`;
 }
 
-/** The bytes of the .tfcase. */
-export function handMadeCase(): Uint8Array<ArrayBuffer> {
-  const mesh = block();
+/** What parts the lips: a seam through the block's front in the height of a lattice plane, and bone along which tissue slides. */
+interface Parting {
+  mesh: Block;
+  rows: MessageInitShape<typeof ContactRowSchema>[];
+  /** Pairs of a vertex and its handle. */
+  sticking: Int32Array;
+}
+
+const SEAM_UP = -26;
+/** Above it the tissue slides on the lower jaw. */
+const VESTIBULE_UP = -40;
+
+/** Doubles of the seam come last, and are the lower lip's. */
+function parted(whole: Block, jaw: readonly number[]): Parting {
+  const seam = verticesWhere(whole, ([x, y, z]) => z === SEAM_UP && y <= LOW[1] + 3 * STEP_MM && Math.abs(x) <= 2 * STEP_MM);
+  const count = whole.positions.length / 3;
+  const doubleOf = new Map(seam.map((vertex, i) => [vertex, count + i]));
+  const isBelow = (t: number) => [0, 1, 2, 3].every((corner) => whole.positions[3 * whole.tets[4 * t + corner] + 2] <= SEAM_UP);
+  const tets = whole.tets.map((vertex, i) => (isBelow(Math.floor(i / 4)) ? (doubleOf.get(vertex) ?? vertex) : vertex));
+  const positions = Float64Array.from([...whole.positions, ...seam.flatMap((vertex) => Array.from(whole.positions.subarray(3 * vertex, 3 * vertex + 3)))]);
+  const front = Math.min(...jaw.map((vertex) => whole.positions[3 * vertex + 1]));
+  const sliding = jaw.filter((vertex) => whole.positions[3 * vertex + 1] === front && whole.positions[3 * vertex + 2] > VESTIBULE_UP);
+  return {
+    mesh: { positions, tets },
+    rows: [
+      ...seam.map((vertex, i) => ({ vertex: count + i, other: { case: "otherVertex" as const, value: vertex }, normal: { x: 0, y: 0, z: -1 } })),
+      ...sliding.map((vertex) => ({ vertex, other: { case: "handle" as const, value: "mandible" }, normal: { x: 0, y: -1, z: 0 }, bilateral: true })),
+    ],
+    sticking: Int32Array.from(sliding.flatMap((vertex) => [vertex, 0])),
+  };
+}
+
+/** The bytes of the .tfcase. `hasContact`: its lips part; without contact it is the same as the one that has none. */
+export function handMadeCase(hasContact = false): Uint8Array<ArrayBuffer> {
+  const whole = block();
+  const jaw = verticesWhere(whole, ([x, y, z]) => Math.abs(x) < 17 && y > -10 && y < 20 && z < -30 && z > -60);
+  const parting = hasContact ? parted(whole, jaw) : null;
+  const mesh = parting?.mesh ?? whole;
+  const stuck = new Set(parting?.sticking.filter((_, i) => i % 2 === 0));
   const payload = concat([mesh.positions, mesh.tets]);
   const name = meshName(mesh, payload);
   const request = create(CreateSessionRequestSchema, {
     mesh: name,
     stiffness: { source: { case: "uniformPa", value: 15_000 } },
     fixedVertices: verticesWhere(mesh, ([, y]) => y === LOW[1] + STEP_MM * COUNTS[1]),
-    handles: [{ name: "mandible", vertices: verticesWhere(mesh, ([x, y, z]) => Math.abs(x) < 17 && y > -10 && y < 20 && z < -25 && z > -60) }],
-    model: 1,
+    handles: [{ name: "mandible", vertices: jaw.filter((vertex) => !stuck.has(vertex)) }],
+    contact: parting?.rows,
+    model: hasContact ? 3 : 1,
   });
   const face = skin();
   const surfaces = [face, teeth(UPPER), teeth(LOWER)];
   const weights = Float32Array.from({ length: face.positions.length }, (_, i) => (i % 3 === 0 ? 1 : 0));
-  const chunks = [...surfaces.flatMap(({ positions, triangles }) => [positions, triangles]), follows(face, mesh), weights, toBinary(CreateSessionRequestSchema, request), payload];
+  const chunks = [...surfaces.flatMap(({ positions, triangles }) => [positions, triangles]), follows(face, mesh), weights, toBinary(CreateSessionRequestSchema, request), ...(parting === null ? [] : [parting.sticking]), payload];
   const { views, bin } = layOut(chunks);
-  return container(JSON.stringify(gltf(surfaces, views, bin.length, manifest(mesh, name))), bin);
+  return container(JSON.stringify(gltf(surfaces, views, bin.length, manifest(mesh, name, request.contact.length))), bin);
 }
 
 function gltf(surfaces: readonly Surface[], views: unknown[], binBytes: number, extension: unknown): unknown {
@@ -138,27 +176,35 @@ function gltf(surfaces: readonly Surface[], views: unknown[], binBytes: number, 
   };
 }
 
-function manifest(mesh: Block, name: string): unknown {
+/** What the page takes for granted where it is missing, and C++ wants to be told. */
+const COMPLETE = {
+  pose: { rotation_vector_deg: [0, 0, 0], pivot_mm: [0, 0, 0], translation_mm: [0, 0, 0], scale: 1 },
+  limits: { translation_mm: 20, rotation_deg: 30 },
+};
+
+function manifest(mesh: Block, name: string, rows: number): unknown {
   const skinLandmarks = PROFILE.map((landmark, row) => ({ name: landmark, label: landmark, position_mm: lps(landmark), skin_vertex: 3 * row + 1 }));
   const bone = (landmark: string, handle?: string) => ({ name: landmark, label: landmark, position_mm: lps(landmark), ...(handle === undefined ? {} : { handle }) });
   const condyle = (landmark: string, x: number) => ({ name: landmark, label: landmark, position_mm: [x, 40, 10] });
   return {
     format: "tissueform-case",
-    version: 1,
+    version: rows > 0 ? 2 : 1,
     title: "Hand-made face",
     notice: "not a medical device",
-    provenance: { software: "test", commit: "none", created: "2026-01-01T00:00:00Z", plan_sha256: "" },
+    provenance: { software: "test", commit: "none", created: "2026-01-01T00:00:00Z", plan_sha256: "0".repeat(64) },
     unit: "mm",
     coordinate_system: "LPS",
-    mesh: { name, vertex_count: mesh.positions.length / 3, tet_count: mesh.tets.length / 4, cell_arrays: [], payload: 9 },
+    mesh: { name, vertex_count: mesh.positions.length / 3, tet_count: mesh.tets.length / 4, cell_arrays: [], payload: rows > 0 ? 10 : 9 },
     session_request: 8,
-    model: "gradient_field",
+    ...(rows > 0 ? { contact: { rows, sticking: 9 } } : {}),
+    model: rows > 0 ? "linear_elastic" : "gradient_field",
     surfaces: [
       { name: "skin", kind: "skin", mesh: 0, follows: { vertices: 6, weights: 7 } },
       { name: "upper teeth", kind: "teeth", mesh: 1 },
       { name: "lower teeth", kind: "teeth", mesh: 2, handle: "mandible" },
     ],
-    handles: [{ name: "mandible", label: "Lower jaw", pivot_mm: [0, 40, 10] }],
+    skin_regions: [],
+    handles: [{ name: "mandible", label: "Lower jaw", pivot_mm: [0, 40, 10], ...(rows > 0 ? COMPLETE : {}) }],
     landmarks: [...skinLandmarks, ...UPPER.map((landmark) => bone(landmark)), ...LOWER.map((landmark) => bone(landmark, "mandible")), condyle("condyle_left", 45), condyle("condyle_right", -45)],
     head_frame: { origin_mm: [0, 0, 0], left: [1, 0, 0], posterior: [0, 1, 0], superior: [0, 0, 1], source: "landmarks" },
   };
