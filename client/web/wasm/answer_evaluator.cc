@@ -25,6 +25,7 @@ struct Instance {
   std::vector<AnswerPose> poses;
   std::vector<float> positions;
   std::vector<float> band_mm;
+  std::vector<double> contact_forces;
   double error_mm = 0;
 };
 
@@ -84,6 +85,16 @@ EXPORT(evaluate) bool Evaluate() {
 }
 EXPORT(error_mm) double ErrorMm() { return tissueform::Self().error_mm; }
 EXPORT(positions) const float* Positions() { return tissueform::Self().positions.data(); }
+
+// The number of contact rows that may lift off: of each the force in Pa mm^2 is written.
+EXPORT(evaluate_contact) size_t EvaluateContact() {
+  auto& self = tissueform::Self();
+  self.contact_forces = self.evaluator->ContactForcesAt(self.poses);
+  return self.contact_forces.size();
+}
+EXPORT(contact_forces) const double* ContactForces() {
+  return tissueform::Self().contact_forces.data();
+}
 
 // Whether the poses have a band; then it is written.
 EXPORT(evaluate_band) bool EvaluateBand() {

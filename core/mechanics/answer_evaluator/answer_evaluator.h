@@ -63,6 +63,11 @@ class BasicAnswerEvaluator {
   // (HasBand).
   bool Band(std::span<const AnswerPose> poses, std::vector<float>* band_mm) const;
 
+  // Forces of the unilateral contact rows in Pa mm^2, at least 0, in the order of the session's
+  // rows. Empty without such rows, and unless the poses are legal (AreLegal). Costs what the
+  // contact of an answer costs.
+  std::vector<double> ContactForcesAt(std::span<const AnswerPose> poses) const;
+
   size_t bytes_held() const;
 
  private:

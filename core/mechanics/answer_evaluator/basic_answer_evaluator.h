@@ -6,6 +6,7 @@
 // The bodies of BasicAnswerEvaluator, for those who instantiate it with a matrix of their own.
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
@@ -83,6 +84,16 @@ bool BasicAnswerEvaluator<Matrix>::Band(std::span<const AnswerPose> poses,
   band_mm->assign(answers_.regions.size(), 0.0F);
   places_.ForEachFree([&](size_t place, size_t number) { (*band_mm)[place] = of_free[number]; });
   return true;
+}
+
+template <typename Matrix>
+std::vector<double> BasicAnswerEvaluator<Matrix>::ContactForcesAt(
+    std::span<const AnswerPose> poses) const {
+  if (!AreLegal(answers_, poses)) return {};
+  std::vector<double> factors = FactorsOf(answers_, poses).factors;
+  const auto rows = static_cast<std::ptrdiff_t>(answers_.contact_gaps.size());
+  contact_.Append(answers_, &factors);
+  return {factors.end() - rows, factors.end()};
 }
 
 template <typename Matrix>

@@ -33,6 +33,10 @@ double VertexResponse::ErrorBoundMm(absl::Span<const HandlePose> poses) const {
   return evaluator_.ErrorMm(ToAnswerPoses(poses));
 }
 
+std::vector<double> VertexResponse::ContactForcesAt(absl::Span<const HandlePose> poses) const {
+  return evaluator_.ContactForcesAt(ToAnswerPoses(poses));
+}
+
 bool VertexResponse::error_is_estimate() const {
   return IsModel(evaluator_.answers(), AnswerModel::kNeoHookean);
 }

@@ -35,7 +35,7 @@ export interface CaseFile {
   surfaces: CaseSurface[];
   sessionRequest: CreateSessionRequest;
   materialRanges: MaterialRanges | null;
-  /** Vertices of the tet mesh that surfaces follow, and the probes, rising: what a drag asks for. */
+  /** Vertices of the tet mesh that surfaces follow, the probes, and where tissue may lift off, rising: what a drag asks for. */
   followed: Int32Array;
   /** For each handle three of its vertices by which others see where it is, or null where it has none that tell. */
   probes: ([number, number, number] | null)[];
@@ -108,7 +108,7 @@ function build(source: CaseSource, manifest: Manifest, container: Container, vie
   const restPositions = Float32Array.from(rest);
   const sessionRequest = parseMessage(() => readRequest(manifest, views), "session request");
   const probes = findProbes(manifest, sessionRequest, restPositions);
-  const followed = unite(raw, probes);
+  const followed = unite(raw, [...probes.flatMap((probe) => probe ?? []), ...touching(sessionRequest)]);
   const places = new Map(Array.from(followed, (vertex, place) => [vertex, place]));
   const surfaces = raw.map(({ vertices, weights, ...surface }) => ({
     ...surface,
@@ -165,8 +165,13 @@ function readFollows(entry: SurfaceEntry, manifest: Manifest, views: Views, coun
   return { vertices, weights };
 }
 
-function unite(surfaces: RawSurface[], probes: CaseFile["probes"]): Int32Array {
-  const all = new Set(probes.flatMap((probe) => probe ?? []));
+/** The vertices of contact rows that may lift off. */
+function touching({ contact }: CreateSessionRequest): number[] {
+  return contact.filter(({ bilateral }) => !bilateral).flatMap(({ vertex, other }) => (other.case === "otherVertex" ? [vertex, other.value] : [vertex]));
+}
+
+function unite(surfaces: RawSurface[], more: readonly number[]): Int32Array {
+  const all = new Set(more);
   for (const { vertices, weights } of surfaces) {
     vertices?.forEach((vertex, i) => {
       if (weights !== null && weights[i] > 0) all.add(vertex);
@@ -197,6 +202,9 @@ function readRequest(manifest: Manifest, views: Views): CreateSessionRequest {
   const names = request.handles.map((handle) => handle.name).sort().join("\n");
   if (request.mesh !== manifest.mesh.name || names !== manifest.handles.map((handle) => handle.name).sort().join("\n")) {
     throw new CaseError("the case's session request has another mesh or other handles than the case");
+  }
+  if (touching(request).some((vertex) => vertex < 0 || vertex >= manifest.mesh.vertexCount)) {
+    throw new CaseError("the case's session request has a contact row with a vertex that the mesh does not have");
   }
   if (request.contact.length !== (manifest.contact?.rows ?? 0)) {
     throw new CaseError(`the case's session request has ${request.contact.length} contact rows, and the case says ${manifest.contact?.rows ?? 0}`);

@@ -25,7 +25,15 @@ export interface EvaluatorExports {
   positions(): number;
   evaluate_band(): number;
   band_mm(): number;
+  evaluate_contact(): number;
+  contact_forces(): number;
 }
+
+/** What an answer has beside positions: of every vertex the band in mm, or of every contact row that may lift off the force in N. */
+export type ValueKind = "band" | "contact";
+
+/** One Pa mm², in N. */
+const FORCE_UNIT_N = 1e-6;
 
 const MOST_ANSWER_BYTES = 2 ** 28;
 
@@ -107,9 +115,10 @@ export class AnswerEvaluator {
     return result;
   }
 
-  /** The band alone, of poses that need not be covered, in an array of the caller's; null without columns of it, for poses that are none, and where one turns too far. */
-  bandAt(poses: readonly Pose[]): Float32Array | null {
-    return this.setPoses(poses) ? (this.band()?.slice() ?? null) : null;
+  /** Of poses that need not be covered, in an array of the caller's; null where there are none: no such columns, poses that are none, for a band where one turns too far. */
+  valuesAt(poses: readonly Pose[], kind: ValueKind): Float32Array | null {
+    if (!this.setPoses(poses)) return null;
+    return kind === "band" ? (this.band()?.slice() ?? null) : this.contactForces();
   }
 
   private setPoses(poses: readonly Pose[]): boolean {
@@ -125,6 +134,12 @@ export class AnswerEvaluator {
     if (this.bandMm === null || this.exports.evaluate_band() === 0) return null;
     this.copy(this.exports.band_mm(), this.bandMm);
     return this.bandMm;
+  }
+
+  private contactForces(): Float32Array | null {
+    const rows = this.exports.evaluate_contact();
+    if (rows === 0) return null;
+    return Float32Array.from(new Float64Array(this.exports.memory.buffer, this.exports.contact_forces(), rows), (force) => FORCE_UNIT_N * force);
   }
 
   /** The memory may grow at any call, which takes its old arrays away from whoever still has them: what is given out is a copy. */

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { AnswerEvaluator, type Evaluation, EvaluationError } from "./answer_evaluator";
+import { AnswerEvaluator, type Evaluation, EvaluationError, type ValueKind } from "./answer_evaluator";
 import type { FromWorker, ToWorker } from "./evaluation_service";
 import { evaluatorModule } from "./evaluator_module";
 
@@ -26,8 +26,8 @@ export interface EvaluationHost {
   readonly hasWorkers: boolean;
   /** In the page it is answered before this returns. */
   ask(poses: readonly Pose[], number: number): void;
-  /** Of every vertex, mm, an array of the caller's; null where the columns know no band. Tells nothing to who listens for answers. */
-  bandAt(poses: readonly Pose[]): Promise<Float32Array | null>;
+  /** As of AnswerEvaluator; null, too, where the host was closed. Tells nothing to who listens for answers. */
+  valuesAt(poses: readonly Pose[], kind: ValueKind): Promise<Float32Array | null>;
   close(): void;
 }
 
@@ -84,8 +84,8 @@ class PageHost implements EvaluationHost {
     this.listener.onEvaluation(this.evaluator.evaluate(poses), number);
   }
 
-  async bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
-    return this.evaluator.bandAt(poses);
+  async valuesAt(poses: readonly Pose[], kind: ValueKind): Promise<Float32Array | null> {
+    return this.evaluator.valuesAt(poses, kind);
   }
 
   close(): void {}
@@ -97,8 +97,8 @@ class WorkerHost implements EvaluationHost {
   /** Of the question that the worker has; null: none. */
   private asked: number | null = null;
   private waiting: { poses: readonly Pose[]; number: number } | null = null;
-  /** Those that wait for a band, the first first. */
-  private readonly bands: ((bandMm: Float32Array | null) => void)[] = [];
+  /** Those that wait for values, the first first. */
+  private readonly asking: ((values: Float32Array | null) => void)[] = [];
   private isClosed = false;
 
   constructor(
@@ -114,11 +114,11 @@ class WorkerHost implements EvaluationHost {
     this.send();
   }
 
-  bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+  valuesAt(poses: readonly Pose[], kind: ValueKind): Promise<Float32Array | null> {
     return new Promise((done) => {
       if (this.isClosed) return done(null);
-      this.bands.push(done);
-      this.worker.postMessage({ kind: "band", poses: [...poses] });
+      this.asking.push(done);
+      this.worker.postMessage({ kind: "values", of: kind, poses: [...poses] });
     });
   }
 
@@ -127,7 +127,7 @@ class WorkerHost implements EvaluationHost {
     this.worker.onmessage = null;
     this.worker.onerror = null;
     this.worker.terminate();
-    this.bands.splice(0).forEach((done) => done(null));
+    this.asking.splice(0).forEach((done) => done(null));
   }
 
   private end(): void {
@@ -144,7 +144,7 @@ class WorkerHost implements EvaluationHost {
 
   private take(message: FromWorker): void {
     if (message.kind === "failed") return this.end();
-    if (message.kind === "band") this.bands.shift()?.(message.bandMm);
+    if (message.kind === "values") this.asking.shift()?.(message.values);
     if (message.kind !== "evaluated" || this.asked === null) return;
     const number = this.asked;
     this.asked = null;

@@ -2,16 +2,16 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import type { Pose } from "../geometry/pose";
-import { AnswerEvaluator } from "./answer_evaluator";
+import { AnswerEvaluator, type ValueKind } from "./answer_evaluator";
 
 // What page and worker say to each other. A worker is loaded once, and answers one question at a time, in their order.
 
-export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string; module: WebAssembly.Module } | { kind: "evaluate"; poses: Pose[] } | { kind: "band"; poses: Pose[] };
+export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string; module: WebAssembly.Module } | { kind: "evaluate"; poses: Pose[] } | { kind: "values"; of: ValueKind; poses: Pose[] };
 
 export type FromWorker =
   | { kind: "ready"; medianMs: number }
   | { kind: "failed"; message: string }
-  | { kind: "band"; bandMm: Float32Array | null }
+  | { kind: "values"; values: Float32Array | null }
   | { kind: "evaluated"; positions: Float32Array; coverage: "covered" | "beyond"; errorBoundMm: number; isEstimate: boolean; uncertainty: Float32Array | null };
 
 /** The worker's side, for whoever has a `post`. */
@@ -23,7 +23,7 @@ export class EvaluationService {
   async take(message: ToWorker): Promise<void> {
     try {
       if (message.kind === "load") await this.load(message);
-      else if (message.kind === "band") this.post({ kind: "band", bandMm: this.evaluator?.bandAt(message.poses) ?? null }, []);
+      else if (message.kind === "values") this.post({ kind: "values", values: this.evaluator?.valuesAt(message.poses, message.of) ?? null }, []);
       else this.evaluate(message.poses);
     } catch (thrown) {
       this.post({ kind: "failed", message: thrown instanceof Error ? thrown.message : String(thrown) }, []);

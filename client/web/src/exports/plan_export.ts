@@ -35,9 +35,16 @@ export function provenanceLines(bench: Workbench): string[] {
     `case ${bench.caseName}`,
     `mesh ${mesh.name}`,
     `model ${bench.modelInfo(modelShown(bench.comparison.value, bench.model.value))?.name ?? ""}`,
+    ...contactLine(bench),
     ...(bench.showsPlan ? [] : [NOT_THE_PLAN]),
     ...Object.entries(provenance).map(([key, value]) => `${key} ${value}`),
   ];
+}
+
+/** Nothing for a case that has no contact. */
+function contactLine({ file }: Pick<Workbench, "file">): string[] {
+  if (file.parted !== null) return ["contact off: tissue sticks, lips are one piece"];
+  return file.sessionRequest.contact.length > 0 ? ["contact: lips part, tissue slides"] : [];
 }
 
 /** What is told of a plan. */
@@ -53,6 +60,7 @@ export function planDocument(bench: ToldPlan, ranges: PlannedRanges = null): str
   const byHandle = new Map(bench.plan.handles.map(({ name }, index) => [name, poses[index]]));
   const leftOut = [
     ...(bench.showsPlan ? [] : [`landmarks, measures and answer: ${NOT_THE_PLAN}`]),
+    ...(bench.file.parted !== null ? ["contact: the face and its measures are without it; tissueform deform --contact off gives them"] : []),
     ...(materialRanges !== null && ranges === null ? ["uncertainty: the stiffness does not distinguish the tissues of the case"] : []),
   ];
   const document = {

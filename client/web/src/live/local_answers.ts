@@ -103,7 +103,12 @@ export class LocalAnswers {
 
   /** The band of other poses than those of the hand, of every vertex, mm; null where the columns know none. */
   bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
-    return this.host?.bandAt(poses) ?? Promise.resolve(null);
+    return this.host?.valuesAt(poses, "band") ?? Promise.resolve(null);
+  }
+
+  /** Of other poses, too: the force in N of every contact row that may lift off; null where the page has no columns that know. */
+  contactAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+    return this.host?.valuesAt(poses, "contact") ?? Promise.resolve(null);
   }
 
   /** The columns that the page answers by, as they travel; null where it has none. */

@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { messageOf } from "../calls/call_error";
-import type { ContactSummary } from "../generated/tissueform/v1/deform_service_pb";
 import { formatNumber } from "../planning/numbers";
+import type { Signal } from "../workbench/signal";
+import type { Touch } from "../workbench/touch";
 import type { Workbench } from "../workbench/workbench";
-import { el, select, throttleToFrame } from "./dom";
+import { button, el, select, throttleToFrame } from "./dom";
 
 const CHOICES = [
   { value: false, label: "Lips part, tissue slides" },
@@ -20,19 +21,32 @@ export function contactPart(bench: Workbench, choose: (sticks: boolean) => Promi
     if (value !== sticks) choose(value).catch((thrown) => (bench.notice.value = messageOf(thrown)));
   });
   field.set(CHOICES, sticks ? 1 : 0);
-  const told = el("p", { class: "quiet" });
-  const show = () => {
-    const text = describeContact(bench.picture.value?.summary?.contact);
-    if (told.textContent !== text) told.textContent = text;
-  };
-  bench.picture.watch(throttleToFrame(show));
-  return el("div", {}, [field.element, told]);
+  return el("div", {}, [field.element, ...(sticks ? [] : touchPart(bench))]);
 }
 
-/** How tissue touches, in a sentence; "" where it is not known. */
-export function describeContact(contact: ContactSummary | undefined): string {
-  if (contact === undefined) return "";
-  const force = contact.maxForceN === undefined ? "" : `, with ${formatNumber(contact.maxForceN, 3)} N at most at one`;
-  const places = `Tissue presses at ${contact.pressingRowCount} of ${contact.rowCount} places${force}.`;
-  return contact.pressingRowCount === 0 ? `Tissue presses nowhere: ${contact.rowCount} places may lift off.` : places;
+/** Points where tissue presses, and the same in words. */
+function touchPart(bench: Workbench): HTMLElement[] {
+  const told = el("p", { class: "quiet", attributes: { role: "status" } });
+  const shows = button("Show contact", () => {
+    shows.setAttribute("aria-pressed", String(shows.getAttribute("aria-pressed") !== "true"));
+    void show();
+  }, { attributes: { "aria-pressed": "false" } });
+  const show = async () => {
+    const touch = await bench.touch();
+    const text = describeTouch(touch);
+    if (told.textContent !== text) told.textContent = text;
+    const isShown = touch !== null && bench.comparison.value === null && bench.bite.value === null && shows.getAttribute("aria-pressed") === "true";
+    bench.view.setPoints("contact", isShown ? touch.points : [], isShown ? touch.colors : undefined);
+  };
+  const later = throttleToFrame(() => void show());
+  for (const signal of [bench.answer, bench.comparison, bench.bite, bench.localState]) (signal as Signal<unknown>).watch(later);
+  return [el("div", { class: "buttons" }, [shows]), told];
+}
+
+/** How tissue touches, in a sentence or two. */
+export function describeTouch(touch: Touch | null): string {
+  if (touch === null) return "Where tissue presses is known once this page answers by itself.";
+  const { pressingCount, rowCount, mostN, lipsApartMm } = touch;
+  const force = pressingCount === 0 ? "" : `, with ${formatNumber(mostN, 3)} N at most at one (bright points: strong)`;
+  return `Tissue presses at ${pressingCount} of ${rowCount} places${force}. Lips up to ${formatNumber(lipsApartMm)} mm apart.`;
 }

@@ -12,7 +12,7 @@ import { type PictureSize, Stage, type StageListener } from "./stage";
 import { type ViewName, viewDirection } from "./views";
 
 /** Points that are drawn over all else, by what they are. */
-const POINT_COLORS = { penetration: 0xff3b30, landmark: 0x18b6a4, suggestion: 0xf2c230, target: 0xe0559b, axis: 0x3f8cff } as const;
+const POINT_COLORS = { penetration: 0xff3b30, landmark: 0x18b6a4, suggestion: 0xf2c230, target: 0xe0559b, axis: 0x3f8cff, contact: 0xffffff } as const;
 export type PointKind = keyof typeof POINT_COLORS;
 
 /** A head on a stage, and how it is looked at: what a planner's page and a follower's page have in common. */
@@ -53,12 +53,13 @@ export class HeadView {
     this.stage.invalidate();
   }
 
-  /** Points in LPS that are to be looked at, instead of those of this kind before. */
-  setPoints(kind: PointKind, positions: readonly Vector[]): void {
+  /** Points in LPS that are to be looked at, instead of those of this kind before. `colors`: red, green and blue of each, 0 to 1, in place of the color of their kind. */
+  setPoints(kind: PointKind, positions: readonly Vector[], colors?: Float32Array): void {
     const points = this.points.get(kind) ?? this.addPoints(kind);
     points.geometry.dispose();
     points.geometry = new three.BufferGeometry();
     points.geometry.setAttribute("position", new three.Float32BufferAttribute(positions.flat(), 3));
+    if (colors !== undefined) points.geometry.setAttribute("color", new three.BufferAttribute(colors, 3));
     points.visible = positions.length > 0;
     this.stage.invalidate();
   }
@@ -114,7 +115,7 @@ export class HeadView {
   }
 
   private addPoints(kind: PointKind): three.Points {
-    const material = new three.PointsMaterial({ color: POINT_COLORS[kind], size: kind === "penetration" ? 6 : 8, sizeAttenuation: false, depthTest: false, transparent: true, opacity: 0.85 });
+    const material = new three.PointsMaterial({ color: POINT_COLORS[kind], vertexColors: kind === "contact", size: kind === "penetration" ? 6 : 8, sizeAttenuation: false, depthTest: false, transparent: true, opacity: 0.85 });
     const points = new three.Points(new three.BufferGeometry(), material);
     points.renderOrder = 4;
     points.frustumCulled = false;

@@ -33,6 +33,7 @@ import { storedMeasures } from "./stored_measures";
 import { StoredPredictions } from "./stored_predictions";
 import { type Target, TargetFit } from "./target_fit";
 import { type TargetPlace, shownMove } from "./target_place";
+import { type Touch, TouchReader } from "./touch";
 import { recallLandmarks, rememberLandmarks } from "./work";
 
 /** What the server's last picture was answered with, be it shown or not. */
@@ -67,6 +68,7 @@ export class Workbench implements ShownFace {
   readonly stored: StoredPredictions;
   readonly local: LocalAnswers;
   readonly map: FaceMap;
+  private readonly touchReader: TouchReader;
 
   readonly selected = new Signal(0);
   readonly connection = new Signal<Connection>({ kind: "preparing", text: "Opening", share: null });
@@ -107,6 +109,7 @@ export class Workbench implements ShownFace {
     this.jaw = new JawOpening(file);
     const rest = followedRest(file);
     this.newest = new NewestAnswer(rest);
+    this.touchReader = new TouchReader(file, rest);
     this.answers = new Answers(gateway, file, caseName, rest);
     this.pacs = new PacsExports(gateway, caseName);
     this.stored = new StoredPredictions(this.answers, this.pacs, {
@@ -245,6 +248,13 @@ export class Workbench implements ShownFace {
     this.gizmo.hide("bite", legend !== null);
     this.showPenetrations();
     this.view.stage.invalidate();
+  }
+
+  /** How tissue touches in the plan's newest answer; null where this page does not know. */
+  async touch(): Promise<Touch | null> {
+    if (this.touchReader.isEmpty) return null;
+    const forcesN = await this.local.contactAt(this.jaw.apply(this.plan.poses()));
+    return forcesN === null ? null : this.touchReader.read(this.newest.displacements, forcesN);
   }
 
   posesByHandle(poses: readonly Pose[]): Map<string, Pose> {

@@ -15,7 +15,7 @@ test("a case with contact is read with its rows and with what sticks without the
   const file = await open(true);
   const whole = await open(false);
   const doubles = file.manifest.mesh.vertexCount - whole.manifest.mesh.vertexCount;
-  expect(doubles).toBe(10);
+  expect(doubles).toBe(20);
   expect(file.sessionRequest.contact.length).toBe(file.manifest.contact?.rows);
   expect(file.sticking.length / 2).toBe(file.sessionRequest.contact.length - doubles);
   expect(file.sessionRequest.handles[0].vertices).not.toContain(file.sticking[0]);

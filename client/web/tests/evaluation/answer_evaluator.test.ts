@@ -31,8 +31,8 @@ test("a handle that turns beyond the range has positions and no band", async () 
   const cases = goldenCases("linear_elastic_band");
   expect(Math.hypot(...cases[7].poses[0].rotationVector)).toBeCloseTo(0.42);
   expect(evaluator.evaluate(cases[7].poses)).toMatchObject({ coverage: "covered", uncertainty: null });
-  expect(evaluator.bandAt(cases[7].poses)).toBeNull();
-  expect(evaluator.bandAt(cases[1].poses)?.length).toBe(cases[1].bandMm?.length);
+  expect(evaluator.valuesAt(cases[7].poses, "band")).toBeNull();
+  expect(evaluator.valuesAt(cases[1].poses, "band")?.length).toBe(cases[1].bandMm?.length);
 });
 
 test("poses that are none are beyond what is covered, and leave the positions as they were", async () => {

@@ -94,7 +94,7 @@ test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes 
   const { told, listening } = listener();
   const worker = new FakeWorker(medianMs);
   const host = await makeHost(bytes, createHash("sha256").update(bytes).digest("hex"), listening, () => worker);
-  const [one, other] = await Promise.all([host.bandAt(cases[1].poses), host.bandAt(cases[2].poses)]);
+  const [one, other] = await Promise.all([host.valuesAt(cases[1].poses, "band"), host.valuesAt(cases[2].poses, "band")]);
   for (const [band, { bandMm }] of [[one, cases[1]], [other, cases[2]]] as const) {
     expect(band?.length).toBe(bandMm?.length);
     bandMm?.forEach((mm, vertex) => expect(Math.abs((band?.[vertex] ?? NaN) - mm)).toBeLessThan(2e-3));
@@ -104,11 +104,11 @@ test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes 
 
 test("columns without a band know none, and who waits for one is told so when the columns go", async () => {
   const host = await makeHost(BYTES, SHA256, listener().listening, () => null);
-  expect(await host.bandAt(CASES[1].poses)).toBeNull();
+  expect(await host.valuesAt(CASES[1].poses, "band")).toBeNull();
   const worker = new FakeWorker(20);
   const beside = await makeHost(BYTES, SHA256, listener().listening, () => worker);
   worker.postMessage = () => {};
-  const waiting = beside.bandAt(CASES[1].poses);
+  const waiting = beside.valuesAt(CASES[1].poses, "band");
   beside.close();
   expect(await waiting).toBeNull();
 });
@@ -119,9 +119,9 @@ test("a worker that ends by itself is told of, and leaves nobody waiting", async
   const host = await makeHost(BYTES, SHA256, listening, () => worker);
   host.ask(CASES[1].poses, 1);
   worker.postMessage = () => {};
-  const waiting = host.bandAt(CASES[1].poses);
+  const waiting = host.valuesAt(CASES[1].poses, "band");
   worker.fail();
-  expect([await waiting, await host.bandAt(CASES[1].poses)]).toEqual([null, null]);
+  expect([await waiting, await host.valuesAt(CASES[1].poses, "band")]).toEqual([null, null]);
   expect(ends).toEqual(["ended"]);
   expect(worker.isTerminated).toBe(true);
   worker.letOut();

@@ -1,7 +1,10 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <random>
@@ -57,6 +60,17 @@ std::shared_ptr<MeshPreparation> PrepareTouchingBar() {
                                   *constraints, {});
 }
 
+double RelativeDistance(const std::vector<double>& actual, const std::vector<double>& expected) {
+  if (actual.size() != expected.size()) return std::numeric_limits<double>::infinity();
+  double distance = 0;
+  double largest = 1;
+  for (size_t row = 0; row < actual.size(); ++row) {
+    distance = std::max(distance, std::abs(actual[row] - expected[row]));
+    largest = std::max(largest, expected[row]);
+  }
+  return distance / largest;
+}
+
 class ContactResponseTest : public ::testing::Test {
  protected:
   ContactResponseTest() : vertices_(static_cast<size_t>(preparation_->mesh().num_vertices())) {
@@ -99,6 +113,7 @@ TEST_F(ContactResponseTest, IsTheDirectAnswerWithinItsBound) {
     const double distance =
         (Answer(pose).cast<double>() - direct.positions).rowwise().norm().maxCoeff();
     EXPECT_LE(distance, response_->ErrorBoundMm({pose}));
+    EXPECT_LE(RelativeDistance(response_->ContactForcesAt({pose}), direct.contact.forces), 1e-6);
     covered += response_->Covers({pose}) ? 1 : 0;
     const auto open = std::ranges::count(direct.contact.forces, 0.0);
     in_part += open > 0 && open < std::ssize(direct.contact.forces) ? 1 : 0;

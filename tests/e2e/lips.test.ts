@@ -1,0 +1,130 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import { execFileSync } from "node:child_process";
+import { readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import type { BrowserContext, Page } from "playwright-core";
+import { handMadeCase } from "../../client/web/tests/testing/hand_made_case";
+import { type Hook, Planner, live, openCase, saveExport, seriousFindings, typeMove } from "./planner";
+
+// A face whose lips part, and the same without contact against the face made in one piece.
+
+const BIN = join(process.env.TISSUEFORM_BUILD_DIR ?? "../../build/release", "bin");
+const LINEAR_ELASTIC = 3;
+/** Frames are float32. */
+const ROUNDED_MM = 2e-5;
+
+let planner: Planner;
+let context: BrowserContext;
+beforeAll(async () => {
+  planner = await Planner.start();
+  context = await planner.browse();
+});
+afterAll(() => planner.stop());
+
+async function openFace(name: string, hasContact: boolean): Promise<{ page: Page; faults: string[] }> {
+  const path = join(planner.folder, `${name}.tfcase`);
+  writeFileSync(path, handMadeCase(hasContact));
+  return openCase(context, planner, path);
+}
+
+/** Displacements of what the case follows, by the server in full. */
+function serverAnswer(page: Page): Promise<number[]> {
+  return page.evaluate(async (model) => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    return Array.from((await bench.answers.ofModel(bench.live.session, model, bench.plan.poses())) as Float32Array);
+  }, LINEAR_ELASTIC);
+}
+
+const farthest = (a: number[], b: number[]) => (a.length === b.length ? Math.max(...a.map((value, i) => Math.abs(value - b[i]))) : Infinity);
+
+/** How far the vertices of the upper lip have come above their doubles, at most and at least. */
+function lipGaps(page: Page): Promise<{ most: number; least: number }> {
+  return page.evaluate(async (model) => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    const { sessionRequest, restPositions } = bench.file;
+    const pairs = sessionRequest.contact.filter((row: any) => row.other.case === "otherVertex");
+    const vertices = pairs.flatMap((row: any) => [row.other.value, row.vertex]);
+    const file = { ...bench.file, followed: Int32Array.from(vertices) };
+    const rest = Float32Array.from(vertices.flatMap((vertex: number) => Array.from(restPositions.slice(3 * vertex, 3 * vertex + 3))));
+    const asked = Object.assign(Object.create(Object.getPrototypeOf(bench.answers)), bench.answers, { file, rest });
+    const moves: Float32Array = await asked.ofModel(bench.live.session, model, bench.jaw.apply(bench.plan.poses()));
+    const gaps = pairs.map((_: unknown, i: number) => moves[6 * i + 2] - moves[6 * i + 5]);
+    return { most: Math.max(...gaps), least: Math.min(...gaps) };
+  }, LINEAR_ELASTIC);
+}
+
+const shownPoints = (page: Page) => page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.points.get("contact")?.geometry.attributes.position.count ?? 0);
+
+test("the page says how tissue touches, and that it knows no band", async () => {
+  const { page, faults } = await openFace("lips", true);
+  await typeMove(page, "Up", "2");
+  await page.getByText(/^Tissue presses at \d+ of \d+ places, with 0\.\d+ N at most at one \(bright points: strong\)\. Lips up to 0\.0 mm apart\.$/).waitFor();
+  await page.getByRole("button", { name: "Show contact" }).click();
+  await expect.poll(() => shownPoints(page)).toBeGreaterThan(0);
+  await typeMove(page, "Up", "-4");
+  await page.getByText(/^Tissue presses at 0 of \d+ places\. Lips up to (?!0\.0)\d\.\d mm apart\.$/).waitFor();
+  expect(await shownPoints(page)).toBe(0);
+  expect(await page.getByLabel("Color by").locator("option").allTextContents()).not.toContain("95 % interval (material)");
+  expect(await seriousFindings(page)).toEqual([]);
+  expect(faults).toEqual([]);
+  await page.close();
+});
+
+test("the jaw opens, and the lips part; closed again they touch and do not pass through each other", async () => {
+  const { page, faults } = await openFace("lips", true);
+  await page.locator("summary").getByText("Jaw and occlusion", { exact: true }).click();
+  await page.getByRole("slider", { name: "Jaw rotation" }).fill("12");
+  expect((await lipGaps(page)).most).toBeGreaterThan(3);
+  await page.getByRole("button", { name: "Close", exact: true }).click();
+  await typeMove(page, "Up", "2");
+  expect((await lipGaps(page)).least).toBeGreaterThan(-ROUNDED_MM);
+  expect(faults).toEqual([]);
+  await page.close();
+});
+
+test("without contact it is the face in one piece, with the same plan, and back again", async () => {
+  const { page, faults } = await openFace("lips", true);
+  await typeMove(page, "Up", "0");
+  await typeMove(page, "Forward", "-3");
+  const parted = await serverAnswer(page);
+  const reloaded = page.waitForEvent("load");
+  await page.getByLabel("Contact").selectOption({ label: "Tissue sticks, lips are one piece" });
+  await reloaded;
+  await live(page);
+  const whole = await openFace("whole", false);
+  await typeMove(whole.page, "Forward", "-3");
+  const skins = () => Promise.all([page, whole.page].map(skinAnswer));
+  await expect.poll(async () => farthest(...((await skins()) as [number[], number[]]))).toBe(0);
+  expect(farthest(parted.slice(0, 9), (await serverAnswer(page)).slice(0, 9))).toBeGreaterThan(0);
+
+  const again = page.waitForEvent("load");
+  await page.getByLabel("Contact").selectOption({ label: "Lips part, tissue slides" });
+  await again;
+  await live(page);
+  await expect.poll(async () => farthest(await serverAnswer(page), parted)).toBeLessThan(ROUNDED_MM);
+  expect([...faults, ...whole.faults]).toEqual([]);
+  await Promise.all([page.close(), whole.page.close()]);
+});
+
+/** Of the skin's vertices alone, by the server: the two cases follow other vertices of the bone. */
+function skinAnswer(page: Page): Promise<number[]> {
+  return page.evaluate(async (model) => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    const moves: Float32Array = await bench.answers.ofModel(bench.live.session, model, bench.plan.poses());
+    return Array.from(bench.file.surfaces[0].follows.places as Uint32Array).flatMap((place) => Array.from(moves.slice(3 * place, 3 * place + 3)));
+  }, LINEAR_ELASTIC);
+}
+
+test("the plan that is exported gives the command line the same face", async () => {
+  const { page } = await openFace("lips", true);
+  await typeMove(page, "Forward", "-3");
+  await saveExport(planner, page, "Case file", "tissueform-case.tfcase");
+  const path = await saveExport(planner, page, "Plan JSON", "tissueform-plan.json");
+  const plan = JSON.parse(readFileSync(path, "utf8"));
+  expect(plan.version).toBe(4);
+  const said = execFileSync(join(BIN, "tissueform"), ["plan", "check", path], { encoding: "utf8" });
+  expect(said).toContain("contact");
+  await page.close();
+});
