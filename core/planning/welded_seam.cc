@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <variant>
@@ -14,32 +13,10 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/constraints/doubled_vertices.h"
 
 namespace tissueform {
 namespace {
-
-// For every vertex the first one at its place that rows join it with: itself unless it is a double.
-absl::StatusOr<std::vector<int32_t>> FirstAtPlace(const Positions& positions,
-                                                  const std::vector<ContactRow>& rows) {
-  std::vector<int32_t> first(static_cast<size_t>(positions.rows()));
-  std::iota(first.begin(), first.end(), 0);
-  for (size_t number = 0; number < rows.size(); ++number) {
-    const ContactRow& row = rows[number];
-    if (row.other == ContactRow::kBone) continue;
-    const auto [earlier, later] = std::minmax(row.vertex, row.other);
-    if (earlier < 0 || later >= positions.rows()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("contact row ", number, " names vertex ", earlier < 0 ? earlier : later,
-                       ", but the mesh has vertices 0 to ", positions.rows() - 1));
-    }
-    if (positions.row(earlier) != positions.row(later)) continue;
-    int32_t& known = first[static_cast<size_t>(later)];
-    known = std::min(known, earlier);
-  }
-  // An earlier vertex is settled before those that are joined with it.
-  for (int32_t& vertex : first) vertex = first[static_cast<size_t>(vertex)];
-  return first;
-}
 
 // The number of vertices without the doubles.
 absl::StatusOr<int32_t> NumKept(const std::vector<int32_t>& first) {

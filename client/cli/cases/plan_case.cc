@@ -17,6 +17,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh/skin_region.h"
 #include "core/planning/case_file/mesh_surfaces.h"
+#include "core/planning/case_file/parted_skin.h"
 #include "core/planning/case_file/skin_follow.h"
 #include "core/planning/model_names.h"
 #include "proto/conversion/material_conversion.h"
@@ -96,7 +97,12 @@ std::vector<CaseSurface> FollowingSurfaces(const PlanProblem& problem,
     if (surface.kind != SurfaceKind::kSkin) continue;
     surface.follows =
         FollowSkin(surface.positions, surface.triangles, *problem.mesh, StickingRegions(problem));
+    PartSkin(*problem.mesh, StickingRegions(problem), problem.constraints.contact(), &surface);
     surface.regions = RegionsOfFollowers(*surface.follows, regions);
+  }
+  if (std::optional<CaseSurface> lips =
+          InsidesOfLips(*problem.mesh, StickingRegions(problem), problem.constraints.contact())) {
+    surfaces.push_back(*std::move(lips));
   }
   return surfaces;
 }

@@ -4,6 +4,7 @@
 #include "core/planning/case_file/mesh_surfaces.h"
 
 #include <array>
+#include <string>
 #include <utility>
 
 #include "core/mesh/tet_topology.h"
@@ -55,21 +56,28 @@ std::optional<CaseSurface> SkinOfMesh(const TetMesh& mesh, const ConstraintSet& 
     }
   }
   if (chosen.empty()) return std::nullopt;
+  CaseSurface skin = SurfaceOf("skin", mesh, boundary(chosen, Eigen::all));
+  if (!region_of_vertex.empty()) {
+    for (const int32_t v : skin.follows->vertices.col(0)) {
+      skin.regions.push_back(region_of_vertex[static_cast<size_t>(v)]);
+    }
+  }
+  return skin;
+}
+
+CaseSurface SurfaceOf(std::string name, const TetMesh& mesh, const TriangleIndices& facets) {
   std::vector<int32_t> from;
-  CaseSurface skin = Compacted(mesh, boundary(chosen, Eigen::all), &from);
-  skin.name = "skin";
+  CaseSurface surface = Compacted(mesh, facets, &from);
+  surface.name = std::move(name);
   FollowedVertices follows;
-  follows.vertices.resize(skin.positions.rows(), 3);
-  follows.weights.setZero(skin.positions.rows(), 3);
+  follows.vertices.resize(surface.positions.rows(), 3);
+  follows.weights.setZero(surface.positions.rows(), 3);
   follows.weights.col(0).setOnes();
   for (size_t v = 0; v < from.size(); ++v) {
     follows.vertices.row(static_cast<Index>(v)).setConstant(from[v]);
-    if (!region_of_vertex.empty()) {
-      skin.regions.push_back(region_of_vertex[static_cast<size_t>(from[v])]);
-    }
   }
-  skin.follows = std::move(follows);
-  return skin;
+  surface.follows = std::move(follows);
+  return surface;
 }
 
 std::vector<CaseSurface> SegmentsOfMesh(const TetMesh& mesh, const ConstraintSet& constraints) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/mechanics/constraints/constraint_set.h"
@@ -19,6 +20,10 @@ namespace tissueform {
 // constrained.
 std::optional<CaseSurface> SkinOfMesh(const TetMesh& mesh, const ConstraintSet& constraints,
                                       const std::vector<uint8_t>& region_of_vertex);
+
+// Facets of the mesh (#F by 3, numbers of its vertices) as a surface whose vertices follow their
+// own.
+CaseSurface SurfaceOf(std::string name, const TetMesh& mesh, const TriangleIndices& facets);
 
 // Where tissue lies on the bone of each handle, facing out of the bone. A handle without a whole
 // facet has none.
