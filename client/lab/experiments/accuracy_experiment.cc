@@ -4,9 +4,7 @@
 #include "client/lab/experiments/accuracy_experiment.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -18,6 +16,7 @@
 #include "client/lab/accuracy/accuracy_table.h"
 #include "client/lab/accuracy/movement_table.h"
 #include "client/lab/experiments/locking_experiment.h"
+#include "client/lab/experiments/scratch_folder.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
@@ -27,26 +26,6 @@ namespace {
 
 // The planning default: pictures and the summary are of this one.
 constexpr double kShownPoissonRatio = 0.45;
-
-// For CalculiX's files, some of which are large; goes with its end.
-class ScratchFolder {
- public:
-  explicit ScratchFolder(std::string path) : path_(std::move(path)) {
-    std::error_code ignored;  // what it costs is told by the first file that cannot be written
-    std::filesystem::create_directories(path_, ignored);
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  const std::string& path() const { return path_; }
-
- private:
-  const std::string path_;
-};
 
 bool IsChosen(const ExperimentOptions& options, const std::string& name) {
   return options.cases.empty() ||

@@ -7,6 +7,7 @@
 #include "client/lab/experiments/blend_experiment.h"
 #include "client/lab/experiments/block_pull_experiment.h"
 #include "client/lab/experiments/guidance_experiment.h"
+#include "client/lab/experiments/lips_experiment.h"
 #include "client/lab/experiments/materials_experiment.h"
 #include "client/lab/experiments/solver_times_experiment.h"
 #include "client/lab/experiments/twist_experiment.h"
@@ -27,6 +28,8 @@ const std::vector<Experiment>& AllExperiments() {
       {"table1", "times of the factorization and of three solves", RunSolverTimesExperiment},
       {"accuracy", "all models against CalculiX, and locking (minutes; only when named; needs ccx)",
        RunAccuracyExperiment, true},
+      {"lips", "contact against CalculiX, two blocks and a head (only when named; needs ccx)",
+       RunLipsExperiment, true},
       {"uncertainty",
        "the band from stiffness on two heads against full sampling (minutes; only when named)",
        RunUncertaintyExperiment, true},

@@ -9,6 +9,7 @@
 
 #include "client/lab/accuracy/accuracy_case.h"
 #include "client/lab/accuracy/calculix.h"
+#include "client/lab/accuracy/contact_cases.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
 #include "core/mechanics/elasticity/elastic_state.h"
@@ -99,42 +100,9 @@ absl::StatusOr<AccuracyCase> HeadChin() {
   return CaseOfPlan("head_chin", "", testing::TestDataPath("plans/head_chin/plan.json"));
 }
 
-// The head with rows in place of regions: every second vertex of the handle slides on it, every
-// third fixed vertex may lift off its bone, some of these with a gap at rest.
-AccuracyCase WithContact(const AccuracyCase& problem) {
-  const ConstraintSet& regions = problem.constraints;
-  const auto thin = [&](const std::vector<int32_t>& vertices, size_t step, const ContactRow& like,
-                        std::vector<ContactRow>* rows) {
-    Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
-    for (const int32_t v : vertices) middle += problem.mesh.positions().row(v);
-    middle /= static_cast<double>(vertices.size());
-    std::vector<int32_t> left;
-    for (size_t i = 0; i < vertices.size(); ++i) {
-      if (i % step != 0) {
-        left.push_back(vertices[i]);
-        continue;
-      }
-      ContactRow& row = rows->emplace_back(like);
-      row.vertex = vertices[i];
-      row.normal = (problem.mesh.positions().row(row.vertex) - middle).normalized();
-      if (!row.bilateral && i % 2 == 0) row.gap_mm = 0.05;
-    }
-    return left;
-  };
-  std::vector<ContactRow> rows;
-  std::vector<HandleRegion> handles = regions.handles();
-  handles[0].vertices = thin(handles[0].vertices, 2, {.handle = 0, .bilateral = true}, &rows);
-  std::vector<int32_t> fixed = thin(regions.fixed(), 3, {}, &rows);
-  AccuracyCase with = problem;
-  with.constraints =
-      ConstraintSet::Create(problem.mesh, std::move(fixed), std::move(handles), std::move(rows))
-          .value();
-  return with;
-}
-
 TEST_F(CalculixOracleTest, LinearElasticityWithContactEqualsCalculixOnAHead) {
   ASSERT_OK_AND_ASSIGN(const AccuracyCase head, HeadChin());
-  const AccuracyCase with = WithContact(head);
+  ASSERT_OK_AND_ASSIGN(const AccuracyCase with, WithContactRows(head));
   ASSERT_OK_AND_ASSIGN(const double distance,
                        Distance(with, DeformationModel::kLinearElastic, 0.45));
   // Of a movement of 4 mm; its share from kSmallMotion, which 1e-4 makes eight times larger.
@@ -147,53 +115,11 @@ TEST_F(CalculixOracleTest, LinearElasticityWithContactEqualsCalculixOnAHead) {
   EXPECT_GT((sticking - sliding).rowwise().norm().maxCoeff(), 0.1);
 }
 
-// Two blocks of 3 x 3 x 4 mm, one on the other; the upper one is pressed down and tilted, so that a
-// part of the faces lifts off. Vertices of the faces lie in pairs.
-AccuracyCase TwoBlocks() {
-  const TetMesh block = testing::Bar({6, 6, 8}, 0.5);
-  const auto vertices = static_cast<int32_t>(block.num_vertices());
-  Positions positions(2 * vertices, 3);
-  positions << block.positions(), block.positions().rowwise() + Eigen::RowVector3d(0, 0, 4);
-  TetIndices tets(2 * block.num_tets(), 4);
-  tets << block.tets(), (block.tets().array() + vertices).matrix();
-  const TetMesh mesh = *TetMesh::Create(positions, tets);
-  std::vector<ContactRow> rows;
-  for (int32_t v = 0; v < vertices; ++v) {
-    for (int32_t w = vertices; w < 2 * vertices && positions(v, 2) == 4; ++w) {
-      if (positions.row(v) != positions.row(w)) continue;
-      rows.push_back({.vertex = w, .other = v, .normal = Eigen::Vector3d::UnitZ()});
-    }
-  }
-  const auto at_height = [&mesh](double height) {
-    return testing::SelectVertices(mesh,
-                                   [height](const Eigen::Vector3d& x) { return x.z() == height; });
-  };
-  HandlePose pose;
-  pose.rotation_vector = {0.08, 0, 0};
-  pose.pivot_mm = {1.5, 1.5, 8};
-  pose.translation_mm = {0.03, 0.02, -0.1};
-  return {"two_blocks",
-          "",
-          mesh,
-          Eigen::VectorXd::Constant(mesh.num_tets(), 15000),
-          ConstraintSet::Create(mesh, at_height(0), {{"top", at_height(8)}}, rows).value(),
-          {pose},
-          {}};
-}
-
 // With another way to say contact: CalculiX integrates the pressure of one surface on the other.
 TEST_F(CalculixOracleTest, LinearElasticityWithContactIsCalculixsOfTwoSurfaces) {
-  const AccuracyCase blocks = TwoBlocks();
-  CalculixProblem problem{blocks.mesh,
-                          blocks.stiffness,
-                          0.3,
-                          blocks.constraints,
-                          ConstrainedDisplacements(blocks.mesh, blocks.constraints, blocks.poses),
-                          CalculixLaw::kLinear,
-                          /*forces_and_stresses=*/true,
-                          BoneMotions(blocks.mesh, blocks.constraints, blocks.poses)};
-  problem.contact = CalculixContact::kSurfaces;
-  ASSERT_OK_AND_ASSIGN(const CalculixResult reference, RunCalculix(problem, folder()));
+  ASSERT_OK_AND_ASSIGN(const AccuracyCase blocks, TwoBlocks());
+  ASSERT_OK_AND_ASSIGN(const CalculixResult reference,
+                       RunCalculix(TwoBlocksForCalculix(blocks), folder()));
   ASSERT_OK_AND_ASSIGN(const Deformation answer,
                        DeformationOf(blocks, DeformationModel::kLinearElastic, 0.3));
   const auto open = std::ranges::count(answer.contact.forces, 0.0);
@@ -208,84 +134,12 @@ TEST_F(CalculixOracleTest, LinearElasticityWithContactIsCalculixsOfTwoSurfaces) 
   EXPECT_NEAR(force, expected.z(), 1e-3 * expected.z());
 }
 
-// A block of 3 x 3 x 3.75 mm under a plate that presses, turns and slides by 2 mm in all. The plate
-// is wider, so that the block stays under it; as a handle it is rigid.
-constexpr double kTop = 3.75;  // mm
-
-AccuracyCase BlockUnderATurningPlate() {
-  const TetMesh block = testing::Bar({4, 4, 5}, 0.75);
-  const TetMesh plate = testing::Bar({9, 9, 2}, 0.75);
-  const auto vertices = static_cast<int32_t>(block.num_vertices());
-  Positions positions(vertices + plate.num_vertices(), 3);
-  positions << block.positions(),
-      plate.positions().rowwise() + Eigen::RowVector3d(-1.875, -1.875, kTop);
-  TetIndices tets(block.num_tets() + plate.num_tets(), 4);
-  tets << block.tets(), (plate.tets().array() + vertices).matrix();
-  const TetMesh mesh = *TetMesh::Create(positions, tets);
-  std::vector<ContactRow> rows;
-  std::vector<int32_t> bottom;
-  for (int32_t v = 0; v < vertices; ++v) {
-    if (positions(v, 2) == 0) bottom.push_back(v);
-    if (positions(v, 2) == kTop) {
-      rows.push_back({.vertex = v, .handle = 0, .normal = -Eigen::Vector3d::UnitZ()});
-    }
-  }
-  std::vector<int32_t> of_plate(static_cast<size_t>(plate.num_vertices()));
-  std::iota(of_plate.begin(), of_plate.end(), vertices);
-  HandlePose pose;
-  pose.rotation_vector = {0.2, -0.15, 0};
-  pose.pivot_mm = {1.5, 1.5, kTop};
-  pose.translation_mm = {0.7, 0.5, -0.45};
-  return {"block_under_plate",
-          "",
-          mesh,
-          Eigen::VectorXd::Constant(mesh.num_tets(), 15000),
-          ConstraintSet::Create(mesh, bottom, {{"plate", of_plate}}, rows).value(),
-          {pose},
-          {}};
-}
-
-// The same with a plate of tissue so stiff that it keeps its shape, moved by its upper face, and
-// with the vertices of both faces in rows, from which CalculiX takes its surfaces.
-CalculixProblem OfTwoSurfaces(const AccuracyCase& problem) {
-  const TetMesh& mesh = problem.mesh;
-  const std::vector<int32_t>& plate = problem.constraints.handles()[0].vertices;
-  std::vector<int32_t> upper;
-  std::vector<int32_t> moved;
-  for (const int32_t v : plate) {
-    if (mesh.positions()(v, 2) == kTop) upper.push_back(v);
-    if (mesh.positions()(v, 2) == kTop + 1.5) moved.push_back(v);
-  }
-  std::vector<ContactRow> rows;
-  for (size_t i = 0; i < upper.size(); ++i) {
-    const size_t like = i % problem.constraints.contact().size();
-    rows.push_back({.vertex = upper[i],
-                    .other = problem.constraints.contact()[like].vertex,
-                    .normal = Eigen::Vector3d::UnitZ()});
-  }
-  Eigen::VectorXd stiffness = problem.stiffness;
-  for (Eigen::Index t = 0; t < mesh.num_tets(); ++t) {
-    if (mesh.tets().row(t).minCoeff() >= plate.front()) stiffness[t] *= 1e3;
-  }
-  const auto constraints =
-      ConstraintSet::Create(mesh, problem.constraints.fixed(), {{"plate", moved}}, rows).value();
-  return {mesh,
-          stiffness,
-          0.3,
-          constraints,
-          ConstrainedDisplacements(mesh, constraints, problem.poses),
-          CalculixLaw::kNeoHookean,
-          /*forces_and_stresses=*/true,
-          BoneMotions(mesh, constraints, problem.poses),
-          CalculixContact::kSurfaces};
-}
-
 // CalculiX's normals turn with its surfaces, ours with the bone.
 TEST_F(CalculixOracleTest, NeoHookeanUnderATurningBoneIsCalculixsOfTwoSurfaces) {
-  const AccuracyCase problem = BlockUnderATurningPlate();
+  ASSERT_OK_AND_ASSIGN(const AccuracyCase problem, BlockUnderPlate());
   EXPECT_NEAR(LargestMove(problem), 2, 0.1);
-  ASSERT_OK_AND_ASSIGN(const CalculixResult reference,
-                       RunCalculix(OfTwoSurfaces(problem), folder()));
+  ASSERT_OK_AND_ASSIGN(const CalculixProblem of_surfaces, BlockUnderPlateForCalculix(problem));
+  ASSERT_OK_AND_ASSIGN(const CalculixResult reference, RunCalculix(of_surfaces, folder()));
   ASSERT_OK_AND_ASSIGN(const Deformation answer,
                        DeformationOf(problem, DeformationModel::kNeoHookean, 0.3));
   const auto open = std::ranges::count(answer.contact.forces, 0.0);
