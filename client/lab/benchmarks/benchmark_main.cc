@@ -38,8 +38,9 @@ absl::StatusOr<FrameBenchmarkList> FrameBenchmarks(const TestBar& bar, int threa
                                                    const std::vector<InstructionSet>& sets) {
   std::vector<FrameBenchmark::Kind> kinds = {FrameBenchmark::Kind::kBasis};
   if (bar.number != kLargeBar) {
-    kinds.insert(kinds.end(), {FrameBenchmark::Kind::kBasisThreeHandles,
-                               FrameBenchmark::Kind::kElastic, FrameBenchmark::Kind::kNeoHookean});
+    kinds.insert(kinds.end(),
+                 {FrameBenchmark::Kind::kBasisThreeHandles, FrameBenchmark::Kind::kElastic,
+                  FrameBenchmark::Kind::kElasticContact, FrameBenchmark::Kind::kNeoHookean});
   }
   FrameBenchmarkList benchmarks;
   for (const FrameBenchmark::Kind kind : kinds) {

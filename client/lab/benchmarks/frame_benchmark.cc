@@ -41,6 +41,24 @@ absl::StatusOr<ConstraintSet> ThreeHandles(const TestBar& bar) {
   return ConstraintSet::Create(bar.mesh, bar.ends.fixed(), std::move(handles));
 }
 
+// As many as a face has where lips and teeth may lift off.
+constexpr int kContactRows = 206;
+
+// The bar beside a wall that rests, at y = 0, a hundredth of a millimeter away.
+absl::StatusOr<ConstraintSet> BesideAWall(const TestBar& bar) {
+  std::vector<int32_t> side;
+  for (int32_t v = 0; v < bar.mesh.num_vertices(); ++v) {
+    if (bar.mesh.positions()(v, 1) == 0) side.push_back(v);
+  }
+  for (const int32_t constrained : bar.ends.constrained()) std::erase(side, constrained);
+  const size_t step = std::max<size_t>(1, side.size() / kContactRows);
+  std::vector<ContactRow> rows;
+  for (size_t i = 0; i < side.size() && rows.size() < kContactRows; i += step) {
+    rows.push_back({.vertex = side[i], .normal = Eigen::Vector3d::UnitY(), .gap_mm = 0.01});
+  }
+  return ConstraintSet::Create(bar.mesh, bar.ends.fixed(), bar.ends.handles(), std::move(rows));
+}
+
 // A drag's pose, turned by as much as is prepared.
 std::vector<HandlePose> TurnedPoses(const TestBar& bar, size_t handles) {
   const Eigen::Vector3d axes[] = {{0, 0, 30}, {0, 20, 20}, {-15, 0, 25}};
@@ -59,6 +77,7 @@ DeformationModel ModelOf(FrameBenchmark::Kind kind) {
     case FrameBenchmark::Kind::kBasisThreeHandles:
       break;
     case FrameBenchmark::Kind::kElastic:
+    case FrameBenchmark::Kind::kElasticContact:
       return DeformationModel::kLinearElastic;
     case FrameBenchmark::Kind::kNeoHookean:
       return DeformationModel::kNeoHookean;
@@ -87,6 +106,8 @@ absl::Status FrameBenchmark::Prepare(int threads) {
   ConstraintSet constraints = bar_.ends;
   if (kind_ == Kind::kBasisThreeHandles) {
     TF_ASSIGN_OR_RETURN(constraints, ThreeHandles(bar_));
+  } else if (kind_ == Kind::kElasticContact) {
+    TF_ASSIGN_OR_RETURN(constraints, BesideAWall(bar_));
   }
   poses_ = TurnedPoses(bar_, constraints.handles().size());
   PreparationOptions options;
@@ -204,6 +225,8 @@ std::string FrameBenchmark::Name(const std::string& what) const {
       return absl::StrCat("basis ", what, ", 3 handles");
     case Kind::kElastic:
       return absl::StrCat("elastic ", what);
+    case Kind::kElasticContact:
+      return absl::StrCat("elastic ", what, ", contact");
     case Kind::kNeoHookean:
       break;
   }
@@ -214,8 +237,13 @@ BenchmarkRow FrameBenchmark::FrameRow(const PartSeconds& medians, InstructionSet
   BenchmarkRow frame;
   frame.work = WorkOnSet(Name("frame"), set, sets_);
   frame.ours_seconds = medians.at(absl::StrCat(frame.work, "/frame"));
-  frame.peer = "back-substitution";
-  frame.peer_seconds = medians.at(absl::StrCat(Name("solve"), "/solve"));
+  if (kind_ == Kind::kElasticContact) {
+    frame.peer = "without contact";
+    frame.peer_seconds = medians.at(absl::StrCat(WorkOnSet("elastic frame", set, sets_), "/frame"));
+  } else {
+    frame.peer = "back-substitution";
+    frame.peer_seconds = medians.at(absl::StrCat(Name("solve"), "/solve"));
+  }
   frame.bytes = response_->bytes_held();
   frame.answer_vertices = static_cast<int64_t>(skin_.size());
   return frame;

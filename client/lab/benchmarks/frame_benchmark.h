@@ -29,6 +29,7 @@ class FrameBenchmark {
     kBasis,              // gradient field, the bar's one handle
     kBasisThreeHandles,  // gradient field, the handle cut in three
     kElastic,            // linear elasticity, one handle
+    kElasticContact,     // the same with contact rows on one side of the bar, beside kElastic
     kNeoHookean,         // in third order, one handle
   };
 
@@ -47,7 +48,7 @@ class FrameBenchmark {
       : bar_(bar), kind_(kind), sets_(std::move(sets)) {}
 
   absl::Status Prepare(int threads);
-  bool IsElastic() const { return kind_ == Kind::kElastic || kind_ == Kind::kNeoHookean; }
+  bool IsElastic() const { return kind_ != Kind::kBasis && kind_ != Kind::kBasisThreeHandles; }
   absl::Status MakeResponse();
   absl::Status CheckAnswers();
   absl::StatusOr<Positions> DirectAnswer();

@@ -53,12 +53,13 @@ TEST_F(BenchTest, TheSmallestBarGivesEveryRow) {
                                     "basis preparation",
                                     "basis preparation, 3 handles",
                                     "elastic int16 encoding",
+                                    "elastic preparation, contact",
                                     "neo-Hookean preparation"};
   for (const InstructionSet set : SupportedInstructionSets()) {
     const bool is_widest = set == SupportedInstructionSets().front();
     const std::string on = is_widest ? "" : absl::StrCat(" [", InstructionSetName(set), "]");
-    for (const char* frame :
-         {"basis frame", "basis frame, 3 handles", "elastic frame", "neo-Hookean frame"}) {
+    for (const char* frame : {"basis frame", "basis frame, 3 handles", "elastic frame",
+                              "elastic frame, contact", "neo-Hookean frame"}) {
       expected.insert(absl::StrCat(frame, on));
     }
   }
