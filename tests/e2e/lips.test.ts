@@ -4,6 +4,7 @@
 import { execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { pathToFileURL } from "node:url";
 import type { BrowserContext, Page } from "playwright-core";
 import { handMadeCase } from "../../client/web/tests/testing/hand_made_case";
 import { type Hook, Planner, live, openCase, saveExport, seriousFindings, typeMove } from "./planner";
@@ -14,6 +15,8 @@ const BIN = join(process.env.TISSUEFORM_BUILD_DIR ?? "../../build/release", "bin
 const LINEAR_ELASTIC = 3;
 /** Frames are float32. */
 const ROUNDED_MM = 2e-5;
+/** Places and weights of moving files are rounded more, and the planner shows prepared answers, too. */
+const MOVING_FILE_MM = 0.01;
 
 let planner: Planner;
 let context: BrowserContext;
@@ -127,4 +130,19 @@ test("the plan that is exported gives the command line the same face", async () 
   const said = execFileSync(join(BIN, "tissueform"), ["plan", "check", path], { encoding: "utf8" });
   expect(said).toContain("contact");
   await page.close();
+});
+
+test("the moving file shows the same face, without a server", async () => {
+  const { page, faults } = await openFace("lips", true);
+  await typeMove(page, "Forward", "-3");
+  await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.local.heldColumns !== null);
+  const path = await saveExport(planner, page, "Moving file", "tissueform-moves.html");
+  const planned = await page.evaluate(() => Array.from((globalThis as unknown as Hook).tissueform.view.head.skins[0].shape.positions as Float32Array));
+  const file = await context.newPage();
+  await file.goto(pathToFileURL(path).href);
+  await file.waitForFunction(() => ((globalThis as any).tissueform?.moving?.answered ?? 0) > 0 && (globalThis as any).tissueform.moving.isIdle);
+  const shown = await file.evaluate(() => Array.from((globalThis as any).tissueform.moving.view.head.skins[0].shape.positions as Float32Array));
+  expect(farthest(planned, shown)).toBeLessThan(MOVING_FILE_MM);
+  expect(faults).toEqual([]);
+  await Promise.all([page.close(), file.close()]);
 });
