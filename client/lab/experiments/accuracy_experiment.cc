@@ -15,8 +15,8 @@
 #include "client/lab/accuracy/accuracy_run.h"
 #include "client/lab/accuracy/accuracy_table.h"
 #include "client/lab/accuracy/movement_table.h"
+#include "client/lab/experiments/calculix_folder.h"
 #include "client/lab/experiments/locking_experiment.h"
-#include "client/lab/experiments/scratch_folder.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
@@ -91,7 +91,7 @@ absl::StatusOr<AccuracySweep> RunCase(const AccuracyCase& problem, const std::st
 }
 
 absl::Status RunCases(const std::vector<AccuracyCase>& cases, const ExperimentOptions& options) {
-  const ScratchFolder scratch(options.Path("accuracy_scratch"));
+  const CalculixFolder scratch(options.Path("accuracy_scratch"));
   Tables tables;
   std::vector<AccuracySweep> sweeps;
   for (const AccuracyCase& problem : cases) {

@@ -15,7 +15,7 @@
 #include "client/lab/accuracy/accuracy_case_list.h"
 #include "client/lab/accuracy/calculix.h"
 #include "client/lab/accuracy/contact_cases.h"
-#include "client/lab/experiments/scratch_folder.h"
+#include "client/lab/experiments/calculix_folder.h"
 #include "core/base/csv_table.h"
 #include "core/base/status_macros.h"
 #include "core/mechanics/deformation/create_deformer.h"
@@ -110,7 +110,7 @@ absl::Status AddRow(const Comparison& comparison, const std::string& scratch, Cs
 absl::Status RunLipsExperiment(const ExperimentOptions& options) {
   SetBlasThreads(1);  // CalculiX gets one thread too
   TF_ASSIGN_OR_RETURN(const std::vector<Comparison> comparisons, AllComparisons(options));
-  const ScratchFolder scratch(options.Path("lips_scratch"));
+  const CalculixFolder scratch(options.Path("lips_scratch"));
   CsvTable table({"case", "model", "rows", "open", "largest_mm", "distance_mm", "distance_percent",
                   "force_n_of_calculix"});
   for (const Comparison& comparison : comparisons) {

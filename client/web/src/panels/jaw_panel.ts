@@ -49,7 +49,7 @@ function openingPart(bench: Workbench): HTMLElement {
   return el("div", { class: "landmark-part" }, [
     el("label", { class: "inline" }, ["Opening", control]),
     told,
-    el("p", { class: "quiet", text: `A hinge through ${how} (blue points). The condyles do not translate; the opening is not part of the plan. It is for looking, not a prediction: beyond about 10° no model bears the tissue around the ramus.` }),
+    el("p", { class: "quiet", text: `A hinge through ${how} (blue points). The condyles do not translate; the opening is not part of the plan. It is an illustration, not a prediction: beyond about 10° no model bears the tissue around the ramus.` }),
     el("div", { class: "buttons" }, [button("Close", () => bench.open(0))]),
   ]);
 }

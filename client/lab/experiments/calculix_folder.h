@@ -11,18 +11,18 @@
 namespace tissueform {
 
 // For CalculiX's files, some of which are large; goes with its end.
-class ScratchFolder {
+class CalculixFolder {
  public:
-  explicit ScratchFolder(std::string path) : path_(std::move(path)) {
+  explicit CalculixFolder(std::string path) : path_(std::move(path)) {
     std::error_code ignored;  // what it costs is told by the first file that cannot be written
     std::filesystem::create_directories(path_, ignored);
   }
-  ~ScratchFolder() {
+  ~CalculixFolder() {
     std::error_code ignored;
     std::filesystem::remove_all(path_, ignored);
   }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  CalculixFolder(const CalculixFolder&) = delete;
+  CalculixFolder& operator=(const CalculixFolder&) = delete;
 
   const std::string& path() const { return path_; }
 
