@@ -59,7 +59,7 @@ absl::StatusOr<AccuracyCase> WithContactRows(const AccuracyCase& problem) {
   std::vector<ContactRow> rows;
   std::vector<HandleRegion> handles = regions.handles();
   handles[0].vertices = thin(handles[0].vertices, 2, {.handle = 0, .bilateral = true}, &rows);
-  std::vector<int32_t> fixed = thin(regions.fixed(), 3, {}, &rows);
+  std::vector<int32_t> fixed = thin(regions.fixed(), 6, {}, &rows);
   AccuracyCase with = problem;
   TF_ASSIGN_OR_RETURN(with.constraints, ConstraintSet::Create(problem.mesh, std::move(fixed),
                                                               std::move(handles), std::move(rows)));

@@ -17,7 +17,7 @@ namespace tissueform {
 inline constexpr double kBlockPoissonRatio = 0.3;
 
 // A case with one handle at least, with rows in place of regions: every second vertex of the first
-// handle slides on it, every third fixed vertex may lift off its bone, some of these with a gap at
+// handle slides on it, every sixth fixed vertex may lift off its bone, some of these with a gap at
 // rest.
 absl::StatusOr<AccuracyCase> WithContactRows(const AccuracyCase& problem);
 
