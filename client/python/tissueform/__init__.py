@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Predicts soft tissue after jaw surgery on a tissueform-server, with numpy arrays in and out.
 
-    import meshio, tissueform
+    import tissueform
     from tissueform import Pose
 
-    points, tets, _ = tissueform.from_meshio(meshio.read("bar.vtu"))
+    points, tets = tissueform.sample_bar()
     z = points[:, 2]
     with tissueform.local() as server, server.connect() as client:
         mesh = client.upload_mesh(points, tets, stiffness=5000.0)
@@ -37,6 +37,7 @@ from .meshes import Mesh  # noqa: E402
 from .poses import Pose, ras_to_lps  # noqa: E402
 from .predictions import Frame, Prediction, Prepared  # noqa: E402
 from .prepared_answers import PreparedAnswers  # noqa: E402
+from .sample_meshes import sample_bar  # noqa: E402
 from .sessions import FIXED_BONE, ContactRow, Session  # noqa: E402
 from .stored_predictions import Export, Measure, StoredPrediction  # noqa: E402
 
@@ -45,5 +46,5 @@ __all__ = [
     "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded", "LocalServer",
     "Measure", "Mesh", "NotFound", "Pose", "Prediction", "Prepared", "PreparedAnswers", "ServerError", "ServerInfo", "ServerUnavailable",
     "Session", "StoredPrediction", "Tls", "TissueformError", "Unauthenticated", "connect", "doctor", "from_meshio", "local", "ras_to_lps",
-    "to_meshio", "to_pyvista",
+    "sample_bar", "to_meshio", "to_pyvista",
 ]

@@ -62,6 +62,13 @@ class _Stream:
         self.call = call
         self.requests = requests
         self.started = started
+        self.unacknowledged: Optional[deform_service_pb2.FrameAck] = None  # the receiving thread's
+
+    def acknowledge(self) -> None:
+        """The frame that was received last has been used."""
+        if self.unacknowledged is not None:
+            self.requests.put(ack=self.unacknowledged)
+            self.unacknowledged = None
 
     def end(self) -> None:
         self.call.cancel()
@@ -156,7 +163,7 @@ class Drag:
     # Receiving.
 
     def receive(self) -> Optional[Frame]:
-        """Blocks until the next frame and acknowledges it; None: the drag has ended.
+        """Acknowledges the last frame, and blocks until the next one; None: the drag has ended.
 
         Errors: the server's, and ServerUnavailable if the connection does not come back within reconnect_timeout.
         """
@@ -164,6 +171,7 @@ class Drag:
             stream = self._stream
             if stream is None:
                 return None
+            stream.acknowledge()
             try:
                 message = self._next_frame(stream)
             except grpc.RpcError as raised:
@@ -180,7 +188,7 @@ class Drag:
                 with self._lock:
                     self._stream = None
                 return None
-            stream.requests.put(ack=deform_service_pb2.FrameAck(sequence=message.sequence, refinement=message.refinement))
+            stream.unacknowledged = deform_service_pb2.FrameAck(sequence=message.sequence, refinement=message.refinement)
             return frame_of(message, self.vertices)
 
     def _next_frame(self, stream: _Stream) -> Optional[deform_service_pb2.DeformFrame]:

@@ -125,6 +125,7 @@ class StoredPrediction:
         return self._exports.create(self.name, measures)
 
     def delete(self) -> None:
+        """Nothing of it is left in the server's store when this returns. Errors: NotFound."""
         self._caller.delete(self._stub.DeletePrediction, prediction_service_pb2.DeletePredictionRequest(name=self.name))
 
 

@@ -7,9 +7,8 @@ import unittest
 
 import numpy as np
 import tissueform
-from bars import bar
 from programs import SOURCE, start_server
-from tissueform import InvalidInput, Pose
+from tissueform import InvalidInput, Pose, sample_bar
 from tissueform._error_details import details_of
 from tissueform._versions import check_version
 from tissueform.errors import ADVICE
@@ -20,7 +19,7 @@ def setUpModule():
     global server, client, mesh
     server = start_server()
     client = server.connect()
-    mesh = client.upload_mesh(*bar(), stiffness=5000.0)
+    mesh = client.upload_mesh(*sample_bar(), stiffness=5000.0)
 
 
 def tearDownModule():
@@ -38,7 +37,7 @@ class MeshTest(unittest.TestCase):
         self.assertNotIn("\n", str(caught.exception))
 
     def test_number_type_and_layout_do_not_matter(self):
-        points, tets = bar()
+        points, tets = sample_bar()
         expected = Payload(check_points(points, False), check_tets(tets, points), {}).name
         wide = np.zeros((len(points), 6), dtype=np.float32)
         wide[:, ::2] = points
@@ -47,38 +46,38 @@ class MeshTest(unittest.TestCase):
             self.assertEqual(client.upload_mesh(given_points, given_tets).name, expected)
 
     def test_wrong_shapes_are_named(self):
-        points, tets = bar()
+        points, tets = sample_bar()
         self.refused(r"shape \(3, 144\)", "correct what", points.T, tets)
         self.refused(r"shape \(4, 432\)", "correct what", points, tets.T)
         self.refused("float64: expected integers", "correct what", points, tets.astype(float))
 
     def test_nan_and_infinity_are_named_with_their_vertex(self):
         for value in (np.nan, np.inf):
-            points, tets = bar()
+            points, tets = sample_bar()
             points[17, 1] = value
             self.refused("vertex 17 of the points", "correct what", points, tets)
 
     def test_indices_from_1_are_recognized(self):
-        points, tets = bar()
+        points, tets = sample_bar()
         self.refused("count from 1", "subtract 1", points, tets + 1)
         self.refused("there are 144 points, 0 to 143", "correct what", points, tets + 2)
         self.refused("vertices -1 to", "correct what", points, tets - 1)
 
     def test_inverted_and_flat_tets_are_named(self):
-        points, tets = bar()
+        points, tets = sample_bar()
         self.refused("432 of 432 tets", r"swap two", points, tets[:, [1, 0, 2, 3]])
         flat = tets.copy()
         flat[5] = flat[5, [0, 1, 2, 2]]
         self.refused("1 of 432 tets are inverted or flat, first tet 5", "repair the mesh", points, flat)
 
     def test_meshes_in_meters_are_recognized(self):
-        points, tets = bar()
+        points, tets = sample_bar()
         self.refused("0.045", "multiply by 1000", points / 1000, tets)
         self.refused("measures", "points in mm", points * 1000, tets)
         self.assertTrue(client.upload_mesh(points / 1000, tets, any_size=True).name)
 
     def test_stiffness_must_be_positive_and_fit_the_tets(self):
-        points, tets = bar()
+        points, tets = sample_bar()
         self.refused("-1.0 Pa", "correct what", points, tets, stiffness=-1.0)
         self.refused(r"expected \(432,\)", "correct what", points, tets, stiffness=np.ones(144))
         values = np.ones(len(tets))
@@ -86,7 +85,7 @@ class MeshTest(unittest.TestCase):
         self.refused("tet 3 is 0.0 Pa", "correct what", points, tets, stiffness=values)
 
     def test_ras_becomes_lps_and_tets_stay_positive(self):
-        points, tets = bar()
+        points, tets = sample_bar()
         marker = np.array([3.0, 4.0, 5.0])  # right, anterior, superior
         np.testing.assert_array_equal(tissueform.ras_to_lps(marker), [-3, -4, 5])
         np.testing.assert_array_equal(tissueform.ras_to_lps(tissueform.ras_to_lps(points)), points)
@@ -110,7 +109,7 @@ class RequestTest(unittest.TestCase):
         self.refused("fixed", client.create_session, mesh, fixed=[3], handles={"end": [3]})
         self.refused('no model "spring"', self.session, model="spring")
         self.refused("stiffness", self.session, stiffness=float("nan"))
-        self.refused("no stiffness", client.create_session, client.upload_mesh(*bar((2, 2, 2))), handles={"end": [0]})
+        self.refused("no stiffness", client.create_session, client.upload_mesh(*sample_bar((2, 2, 2))), handles={"end": [0]})
 
     def test_poses_that_are_wrong_are_named(self):
         with self.session() as session:

@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """From a mesh to predictions, on a real server."""
 
+import sys
 import tempfile
 import threading
+import types
 import unittest
+import unittest.mock
 
 import meshio
 import numpy as np
 import tissueform
-from bars import bar
 from programs import SOURCE, start_server, tissueform_command
-from tissueform import ContactRow, Freedom, Pose
+from tissueform import ContactRow, Freedom, Pose, sample_bar
 
 PLAN = SOURCE / "tests/data/plans/bar"
 BEND = {"end": Pose(translation_mm=(0, 2, 0), rotation_vector=(0.1, 0, 0), pivot_mm=(7, 7, 40))}
@@ -21,7 +23,7 @@ def setUpModule():
     global server, client, points, mesh
     server = start_server()
     client = server.connect()
-    points, tets = bar()
+    points, tets = sample_bar()
     mesh = client.upload_mesh(points, tets, stiffness=5000.0)
 
 
@@ -192,13 +194,25 @@ class SessionTest(unittest.TestCase):
 
 class AdaptorTest(unittest.TestCase):
     def test_meshio_gets_positions_and_displacements(self):
-        given, tets = bar()
+        given, tets = sample_bar()
         moved = tissueform.to_meshio(given, tets, given + [0, 0, 1])
         np.testing.assert_array_equal(moved.point_data["displacement_mm"], np.tile([0.0, 0, 1], (144, 1)))
         again, again_tets, stiffness = tissueform.from_meshio(moved)
         np.testing.assert_array_equal(again, given + [0, 0, 1])
         np.testing.assert_array_equal(again_tets, tets)
         self.assertIsNone(stiffness)
+
+    def test_pyvista_gets_positions_and_displacements(self):
+        class Grid:  # PyVista is not in Debian: the constructor and the property that we use
+            def __init__(self, cells, positions):
+                self.cells, self.points, self.point_data = cells, positions, {}
+
+        given, tets = sample_bar()
+        fake = types.SimpleNamespace(UnstructuredGrid=Grid, CellType=types.SimpleNamespace(TETRA=10))
+        with unittest.mock.patch.dict(sys.modules, {"pyvista": fake}):
+            grid = tissueform.to_pyvista(given, tets, given + [0, 0, 1])
+        np.testing.assert_array_equal(grid.cells[10], tets)
+        np.testing.assert_array_equal(grid.point_data["displacement_mm"], np.tile([0.0, 0, 1], (144, 1)))
 
     def test_a_mesh_without_tets_is_refused(self):
         with self.assertRaisesRegex(tissueform.InvalidInput, "no linear tets"):
