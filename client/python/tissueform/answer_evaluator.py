@@ -13,6 +13,8 @@ from .answer_file import FIXED, FREE, GRADIENT_FIELD, LINEAR_ELASTIC, NEO_HOOKEA
 
 _SLACK = 1e-9
 _LARGEST_BAND_ROTATION = 0.524
+# Radii that hold 95 of 100 of a standard normal distribution in one, two and three dimensions.
+_OF_ONE, _OF_TWO, _OF_THREE = 1.959964, 2.447747, 2.795483
 _MAX_BLOCK_STEPS = 50
 
 
@@ -302,7 +304,8 @@ class AnswerEvaluator:
         moving = squares > 0
         x = np.clip(trace[moving] ** 2 / squares[moving], 1, 3) - 2
         of_free = np.zeros(len(file.free))
-        of_free[moving] = np.sqrt(squares[moving] / trace[moving]) * (2.447747 + 0.4177595 * x - 0.0700235 * x * x)
+        root = _OF_TWO + (_OF_THREE - _OF_ONE) / 2 * x + (_OF_ONE - 2 * _OF_TWO + _OF_THREE) / 2 * x * x
+        of_free[moving] = np.sqrt(squares[moving] / trace[moving]) * root
         band = np.zeros(len(file.regions))
         band[self._is_free] = of_free
         return band

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
-from typing import AsyncIterator, Callable, Optional, TypeVar
+from typing import AsyncIterator, Callable, Optional, Type, TypeVar
 
 from .drag import Drag
 from .poses import Poses
@@ -33,6 +33,7 @@ class AsyncDrag:
     def __init__(self, open_drag: Callable[[], Drag]) -> None:
         self._open_drag = open_drag
         self._thread = concurrent.futures.ThreadPoolExecutor(1, thread_name_prefix="tissueform-drag")
+        self._cancelled = False
         self.drag: Drag
 
     async def _run(self, function: Callable[[], Result]) -> Result:
@@ -52,8 +53,12 @@ class AsyncDrag:
             raise
         return self
 
-    async def __aexit__(self, *_: object) -> None:
-        self.cancel()
+    async def __aexit__(self, kind: Optional[Type[BaseException]], *_: object) -> None:
+        try:
+            if kind is None and not self._cancelled:
+                await self._run(self.drag.finish)
+        finally:
+            self.cancel()
 
     def send(self, poses: Poses, *, commit: bool = False) -> int:
         """See Drag.send. Does not block."""
@@ -80,6 +85,6 @@ class AsyncDrag:
 
     def cancel(self) -> None:
         """Ends the drag and its thread. See Drag.cancel."""
-        if hasattr(self, "drag"):
-            self.drag.cancel()
+        self._cancelled = True
+        self.drag.cancel()
         self._thread.shutdown(wait=False)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from typing import Any, Callable, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Iterator, List, Optional, Sequence, Tuple, Type
 
 import grpc
 import numpy as np
@@ -81,6 +81,8 @@ class Drag:
         with session.drag(prepared=True) as drag:
             frame = drag.move({"jaw": Pose(translation_mm=(0, -4, 0))})
 
+    At the end of the block poses that were sent with commit are durable.
+
     Or send poses on one thread, and iterate over the frames on another. The newest pose wins: poses that the server has not begun are
     replaced. If the connection breaks, or the server starts again, the drag continues within reconnect_timeout: the newest pose is sent
     again. One thread may receive while others send. vertices: numbers in the mesh of the vertices of the frames, (#V,) int32; None: all.
@@ -99,6 +101,7 @@ class Drag:
         self._sequence = 0
         self._newest: Optional[deform_service_pb2.PoseUpdate] = None
         self._uncommitted: Optional[deform_service_pb2.PoseUpdate] = None
+        self._commit_failure = ""
         self._closed = False
         self._backoff = Backoff()
         self._may_be_at_once = True
@@ -201,7 +204,9 @@ class Drag:
         return None
 
     def _take(self, notice: Notice) -> None:
-        if notice.HasField("committed") and not notice.committed.failure:
+        if notice.HasField("committed") and notice.committed.failure:
+            self._commit_failure = notice.committed.failure
+        elif notice.HasField("committed"):
             with self._lock:
                 self.last_committed = notice.committed.sequence
                 if self._uncommitted is not None and self._uncommitted.sequence <= notice.committed.sequence:
@@ -220,8 +225,25 @@ class Drag:
     def __enter__(self) -> "Drag":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.cancel()
+    def __exit__(self, kind: Optional[Type[BaseException]], *_: object) -> None:
+        try:
+            if kind is None:
+                self.finish()
+        finally:
+            self.cancel()
+
+    def finish(self) -> None:
+        """Waits until the poses that were sent with `commit` are durable; at once where none wait. No more poses can be sent.
+
+        Errors: those of `receive`; ServerError (the server could not store them).
+        """
+        if self._uncommitted is None:
+            return
+        self.close()
+        for _ in self:
+            pass
+        if self._uncommitted is not None and not self._cancelled.is_set():
+            raise ServerError(f"the poses were not committed: {self._commit_failure or 'the drag ended before'}", advice="commit them again")
 
     # Opening.
 

@@ -58,13 +58,13 @@ class Fit:
     response: plan_service_pb2.FitResponse
 
 
-def _target_to_proto(target: FitTarget) -> plan_service_pb2.FitTarget:
+def _target_to_proto(target: FitTarget, mesh_vertices: int) -> plan_service_pb2.FitTarget:
     message = plan_service_pb2.FitTarget(name=target.name, weight=target.weight)
     at = list(target.at)
     if len(at) == 3 and not all(isinstance(number, int) for number in at):
         message.point_mm.CopyFrom(vector_to_proto(at, f'the point of target "{target.name}"'))
     else:
-        numbers = indices_of(target.at, f'the vertices of target "{target.name}"')
+        numbers = indices_of(target.at, f'the vertices of target "{target.name}"', mesh_vertices)
         message.vertices.CopyFrom(geometry_pb2.VertexList(vertices=numbers.tolist()))
     if (target.position_mm is None) == (target.displacement_mm is None):
         raise InvalidInput(f'target "{target.name}": give one of position_mm and displacement_mm')
@@ -92,11 +92,11 @@ def _freedom_to_proto(handle: str, freedom: Freedom) -> plan_service_pb2.FitFree
     return message
 
 
-def fit_request(session: str, targets: Sequence[FitTarget], freedoms: Mapping[str, Freedom], poses: Sequence[geometry_pb2.HandlePose],
+def fit_request(session: str, mesh_vertices: int, targets: Sequence[FitTarget], freedoms: Mapping[str, Freedom], poses: Sequence[geometry_pb2.HandlePose],
                 symmetric: bool, tolerance_mm: float, model: Any, verify: bool) -> plan_service_pb2.FitRequest:
     """Errors: InvalidInput."""
     return plan_service_pb2.FitRequest(
-        session=session, targets=[_target_to_proto(target) for target in targets],
+        session=session, targets=[_target_to_proto(target, mesh_vertices) for target in targets],
         freedoms=[_freedom_to_proto(handle, freedom) for handle, freedom in freedoms.items()], poses=poses, symmetric=symmetric,
         tolerance_mm=tolerance_mm, model=model, verify=verify)
 

@@ -50,9 +50,17 @@ def mesh_of(message: Any, stiffness: Union[None, float, str] = None) -> Mesh:
     return Mesh(message.name, message.vertex_count, message.tet_count, names, stiffness)
 
 
+def as_array(values: npt.ArrayLike, what: str, dtype: Any = None) -> npt.NDArray[Any]:
+    """Contiguous. Errors: InvalidInput (not numbers, or rows of different lengths)."""
+    try:
+        return np.ascontiguousarray(values, dtype=dtype)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"{what} cannot be made an array of numbers: {error}") from error
+
+
 def check_points(points: npt.ArrayLike, any_size: bool) -> Points:
     """A contiguous copy, or the array itself. Errors: InvalidInput."""
-    checked = np.ascontiguousarray(points, dtype=np.float64)
+    checked = as_array(points, "points", np.float64)
     if checked.ndim != 2 or checked.shape[1] != 3 or len(checked) < 4:
         raise InvalidInput(f"points have the shape {checked.shape}: expected (#V, 3) with at least 4 vertices")
     bad = np.flatnonzero(~np.isfinite(checked).all(axis=1))
@@ -67,7 +75,7 @@ def check_points(points: npt.ArrayLike, any_size: bool) -> Points:
 
 def check_tets(tets: npt.ArrayLike, points: Points) -> Tets:
     """A contiguous int32 array, (#T, 4). Errors: InvalidInput (shape, type, indices, inverted or flat tets)."""
-    given = np.asarray(tets)
+    given = as_array(tets, "tets")
     if given.ndim != 2 or given.shape[1] != 4 or len(given) == 0 or given.dtype.kind not in "iu":
         raise InvalidInput(f"tets have the shape {given.shape} and the type {given.dtype}: expected integers, (#T, 4)")
     lowest, highest = int(given.min()), int(given.max())
@@ -86,7 +94,7 @@ def check_tets(tets: npt.ArrayLike, points: Points) -> Tets:
 
 
 def check_cell_array(values: npt.ArrayLike, name: str, tet_count: int) -> npt.NDArray[np.float64]:
-    checked = np.ascontiguousarray(values, dtype=np.float64)
+    checked = as_array(values, f'cell array "{name}"', np.float64)
     if checked.shape != (tet_count,) or not np.isfinite(checked).all():
         raise InvalidInput(f'cell array "{name}" has the shape {checked.shape}: expected ({tet_count},), finite numbers')
     if name == STIFFNESS_ARRAY and not (checked > 0).all():
@@ -111,6 +119,7 @@ class Payload:
         self.header = mesh_service_pb2.MeshHeader(vertex_count=len(points), tet_count=len(tets), cell_arrays=list(cell_arrays),
                                                   total_bytes=self.total_bytes, sha256=digest.hexdigest())
         self.name = f"meshes/{digest.hexdigest()}"
+        self.failure: Optional[BaseException] = None  # of the caller's on_progress, which gRPC calls on a thread of its own
 
     def requests(self, begin: int, on_progress: Optional[Progress]) -> Iterator[mesh_service_pb2.UploadMeshRequest]:
         """The header and the chunks from byte `begin` on."""
@@ -121,10 +130,17 @@ class Payload:
                 data = bytes(segment[at:at + _CHUNK_BYTES])
                 yield self._chunk(start + at, data)
                 if on_progress is not None:
-                    on_progress(start + at + len(data), self.total_bytes)
+                    self._report(on_progress, start + at + len(data))
             start += len(segment)
         if begin >= self.total_bytes:
             yield self._chunk(begin, b"")
+
+    def _report(self, on_progress: Progress, sent_bytes: int) -> None:
+        try:
+            on_progress(sent_bytes, self.total_bytes)
+        except BaseException as failure:
+            self.failure = failure
+            raise
 
     def _chunk(self, offset: int, data: bytes) -> mesh_service_pb2.UploadMeshRequest:
         last = offset + len(data) == self.total_bytes
@@ -178,6 +194,8 @@ class MeshCalls:
                 return response.mesh
             except grpc.RpcError as raised:
                 error = error_of_call(raised)
+            if payload.failure is not None:
+                raise payload.failure
             wait = backoff.after(error)
             if not _may_repeat(error, damaged_before) or time.monotonic() + wait > give_up:
                 raise error

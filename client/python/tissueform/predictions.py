@@ -31,10 +31,12 @@ def model_to_proto(model: Optional[str]) -> Any:
     return MODELS[model]
 
 
-def indices_of(vertices: Any, what: str) -> npt.NDArray[np.int32]:
-    """0-based vertex numbers in one dimension. A mask of booleans gives the numbers of its true entries."""
+def indices_of(vertices: Any, what: str, mesh_vertices: int) -> npt.NDArray[np.int32]:
+    """0-based vertex numbers in one dimension. A mask of booleans, (mesh_vertices,), gives the numbers of its true entries."""
     given = np.asarray(vertices)
-    if given.dtype == np.bool_ and given.ndim == 1:
+    if given.dtype == np.bool_:
+        if given.shape != (mesh_vertices,):
+            raise InvalidInput(f"{what} are a mask of the shape {given.shape}: expected ({mesh_vertices},)")
         given = np.flatnonzero(given)
     if given.size == 0:
         given = given.astype(np.int32)
@@ -43,14 +45,14 @@ def indices_of(vertices: Any, what: str) -> npt.NDArray[np.int32]:
     return given.astype(np.int32)
 
 
-def selection_to_proto(vertices: Vertices) -> geometry_pb2.VertexSelection:
+def selection_to_proto(vertices: Vertices, mesh_vertices: int) -> geometry_pb2.VertexSelection:
     if isinstance(vertices, str):
         if vertices == "all":
             return geometry_pb2.VertexSelection(all=geometry_pb2.AllVertices())
         if vertices == "skin":
             return geometry_pb2.VertexSelection(skin=geometry_pb2.SkinVertices())
         raise InvalidInput(f'"{vertices}" is not a selection of vertices: give "all", "skin" or vertex numbers')
-    numbers = indices_of(vertices, "vertices")
+    numbers = indices_of(vertices, "vertices", mesh_vertices)
     return geometry_pb2.VertexSelection(list=geometry_pb2.VertexList(vertices=numbers.tolist()))
 
 

@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Union
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Type, Union
 
 from ._calls import Caller, new_id
 from .async_drag import AsyncDrag
 from .drag import Drag, Notice
-from .errors import InvalidInput, ServerUnavailable
+from .errors import InvalidInput, NotFound, ServerUnavailable, TissueformError
 from .fitting import Fit, FitTarget, Freedom, fit_of, fit_request
 from .meshes import Mesh, check_stiffness
 from .poses import Pose, Poses, Vector, poses_of, poses_to_proto, vector_to_proto
@@ -58,8 +58,8 @@ def _stiffness_to_proto(stiffness: Optional[Stiffness]) -> session_pb2.Stiffness
     return session_pb2.Stiffness(uniform_pa=check_stiffness(float(stiffness)))
 
 
-def _handles_to_proto(handles: Mapping[str, Any]) -> List[session_pb2.Handle]:
-    return [session_pb2.Handle(name=name, vertices=indices_of(vertices, f'the vertices of handle "{name}"').tolist())
+def _handles_to_proto(handles: Mapping[str, Any], mesh_vertices: int) -> List[session_pb2.Handle]:
+    return [session_pb2.Handle(name=name, vertices=indices_of(vertices, f'the vertices of handle "{name}"', mesh_vertices).tolist())
             for name, vertices in handles.items()]
 
 
@@ -85,12 +85,22 @@ class Session:
     def __enter__(self) -> "Session":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.delete()
+    def __exit__(self, kind: Optional[Type[BaseException]], *_: object) -> None:
+        try:
+            self.delete()
+        except NotFound:
+            return
+        except TissueformError:
+            if kind is None:  # otherwise the block's own error counts
+                raise
 
     @property
     def handles(self) -> List[str]:
         return list(self.description.handles)
+
+    @property
+    def _vertex_count(self) -> int:
+        return int(self.description.vertex_count)
 
     @property
     def model(self) -> str:
@@ -108,9 +118,9 @@ class Session:
         Errors: InvalidInput, NotFound (the session has ended), LimitExceeded, ServerUnavailable.
         """
         request = deform_service_pb2.DeformOnceRequest(session=self.name, poses=poses_to_proto(poses, self.handles),
-                                                       vertices=selection_to_proto(vertices), model=model_to_proto(model))
+                                                       vertices=selection_to_proto(vertices, self._vertex_count), model=model_to_proto(model))
         response = self._caller.unary(self._deform.DeformOnce, request, self.name)
-        numbers = None if isinstance(vertices, str) else indices_of(vertices, "vertices")
+        numbers = None if isinstance(vertices, str) else indices_of(vertices, "vertices", self._vertex_count)
         return Prediction(positions_of(response.positions), response.summary, numbers, response.quality)
 
     def drag(self, *, vertices: Vertices = "all", model: Optional[str] = None, prepared: Union[bool, Prepared] = False,
@@ -122,7 +132,7 @@ class Session:
         Errors: InvalidInput, NotFound, LimitExceeded (too many drags), ServerUnavailable.
         """
         configuration = deform_service_pb2.DeformConfiguration(
-            session=self.name, vertices=selection_to_proto(vertices), model=model_to_proto(model), max_unacked=max_unacked,
+            session=self.name, vertices=selection_to_proto(vertices, self._vertex_count), model=model_to_proto(model), max_unacked=max_unacked,
             prepared=prepared_to_proto(prepared))
         return Drag(self._caller, self.handles, configuration, reconnect_timeout=reconnect_timeout, on_notice=on_notice)
 
@@ -137,10 +147,10 @@ class Session:
 
         Errors: InvalidInput (NO_PREPARED_ANSWERS: arap has none), LimitExceeded (too many bytes: ask for fewer vertices), DataDamaged.
         """
-        request = deform_service_pb2.GetPreparedAnswersRequest(session=self.name, vertices=selection_to_proto(vertices),
+        request = deform_service_pb2.GetPreparedAnswersRequest(session=self.name, vertices=selection_to_proto(vertices, self._vertex_count),
                                                                model=model_to_proto(model), prepared=prepared_to_proto(prepared))
         data = self._caller.stream(self._deform.GetPreparedAnswers, request, read_answers, self.name)
-        numbers = None if isinstance(vertices, str) else indices_of(vertices, "vertices")
+        numbers = None if isinstance(vertices, str) else indices_of(vertices, "vertices", self._vertex_count)
         return PreparedAnswers(data, self.handles, numbers, lambda poses: self.predict(poses, vertices=vertices, model=model))
 
     def store_prediction(self, poses: Poses, *, model: Optional[str] = None, title: str = "", case: str = "") -> StoredPrediction:
@@ -159,7 +169,7 @@ class Session:
         Errors: InvalidInput, NotFound, LimitExceeded.
         """
         start = poses_to_proto(poses, self.handles) if poses is not None else []
-        request = fit_request(self.name, targets, freedoms, start, symmetric, tolerance_mm, model_to_proto(model), verify)
+        request = fit_request(self.name, self._vertex_count, targets, freedoms, start, symmetric, tolerance_mm, model_to_proto(model), verify)
         return fit_of(self._caller.unary(self._plans.Fit, request, self.name))
 
     def update(self, *, stiffness: Optional[Stiffness] = None, model: Optional[str] = None, poisson_ratio: Optional[float] = None,
@@ -177,7 +187,8 @@ class Session:
             request.stiffness.CopyFrom(_stiffness_to_proto(stiffness))
         if handles is not None:
             request.regions.CopyFrom(session_service_pb2.SessionRegions(
-                fixed_vertices=indices_of([] if fixed is None else fixed, "fixed vertices").tolist(), handles=_handles_to_proto(handles),
+                fixed_vertices=indices_of([] if fixed is None else fixed, "fixed vertices", self._vertex_count).tolist(),
+                handles=_handles_to_proto(handles, self._vertex_count),
                 contact=[_contact_to_proto(row, index) for index, row in enumerate(contact)]))
         whole = session_service_pb2.PrepareSessionRequest(update=request)
         self.description = prepare(self._caller, self._sessions, whole, self.name, on_progress, repeat_if_lost=False)
@@ -213,7 +224,8 @@ def create_session(caller: Caller, mesh: Mesh, handles: Mapping[str, Any], fixed
     """See Client.create_session."""
     request = session_service_pb2.CreateSessionRequest(
         mesh=mesh.name, stiffness=_stiffness_to_proto(mesh.stiffness if stiffness is None else stiffness),
-        fixed_vertices=indices_of(fixed, "fixed vertices").tolist(), handles=_handles_to_proto(handles), model=model_to_proto(model),
+        fixed_vertices=indices_of(fixed, "fixed vertices", mesh.vertex_count).tolist(),
+        handles=_handles_to_proto(handles, mesh.vertex_count), model=model_to_proto(model),
         poisson_ratio=poisson_ratio, contact=[_contact_to_proto(row, index) for index, row in enumerate(contact)], project=project,
         request_id=new_id())
     stub = caller.stub(session_service_pb2_grpc.SessionServiceStub)

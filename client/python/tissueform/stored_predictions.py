@@ -108,7 +108,7 @@ class StoredPrediction:
                 vertices: Vertices = "all") -> prediction_pb2.PredictionComparison:
         """Distances to another prediction of the same mesh, or to what another model answers to the same poses
         (v1.PredictionComparison: distances.mean_mm, p95_mm, max_mm, ...). Errors: Conflict (NOT_COMPARABLE), NotFound, InvalidInput."""
-        request = prediction_service_pb2.ComparePredictionsRequest(prediction=self.name, vertices=selection_to_proto(vertices))
+        request = prediction_service_pb2.ComparePredictionsRequest(prediction=self.name, vertices=selection_to_proto(vertices, self.description.vertex_count))
         if other is not None:
             request.other_prediction = other.name
         else:

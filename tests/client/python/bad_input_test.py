@@ -49,6 +49,8 @@ class MeshTest(unittest.TestCase):
         points, tets = sample_bar()
         self.refused(r"shape \(3, 144\)", "correct what", points.T, tets)
         self.refused(r"shape \(4, 432\)", "correct what", points, tets.T)
+        self.refused("cannot be made an array", "correct what", [[0, 0, 0], [1, 2]], tets)
+        self.refused("cannot be made an array", "correct what", "abc", tets)
         self.refused("float64: expected integers", "correct what", points, tets.astype(float))
 
     def test_nan_and_infinity_are_named_with_their_vertex(self):
@@ -106,6 +108,7 @@ class RequestTest(unittest.TestCase):
         self.refused("expected vertex numbers", client.create_session, mesh, handles={"end": [0.5, 1.5]})
         self.refused("expected vertex numbers", client.create_session, mesh, handles={"end": [-1]})
         self.refused("end", client.create_session, mesh, handles={"end": [144]})
+        self.refused(r"a mask of the shape \(143,\): expected \(144,\)", client.create_session, mesh, handles={"end": np.ones(143, bool)})
         self.refused("fixed", client.create_session, mesh, fixed=[3], handles={"end": [3]})
         self.refused('no model "spring"', self.session, model="spring")
         self.refused("stiffness", self.session, stiffness=float("nan"))

@@ -101,6 +101,9 @@ class Played(session_service_pb2_grpc.SessionServiceServicer, deform_service_pb2
             if request.HasField("pose"):
                 self.play(request, context)
                 yield deform_service_pb2.DeformResponse(frame=deform_service_pb2.DeformFrame(sequence=request.pose.sequence, positions=bytes(12)))
+                if request.pose.commit:
+                    committed = deform_service_pb2.CommittedNotice(sequence=request.pose.sequence, failure="the disk is full")
+                    yield deform_service_pb2.DeformResponse(notice=deform_service_pb2.DeformNotice(committed=committed))
 
 
 LOST = grpc.StatusCode.UNAVAILABLE
@@ -136,6 +139,18 @@ class ClusterTest(unittest.TestCase):
         self.client.session(NAME)
         self.client.session(NAME)
         self.assertEqual(self.nodes(), ["", "a", "b"])
+
+    def test_a_session_goes_to_the_server_that_has_room(self):
+        self.played.script = ["a", Fault(grpc.StatusCode.RESOURCE_EXHAUSTED, "MEMORY_BUDGET_FULL", node="b"), "b"]
+        self.client.session(NAME)
+        self.client.create_session(tissueform.Mesh("meshes/" + "0" * 64, 4, 1), handles={"end": [0]}, stiffness=1.0)
+        self.assertEqual(self.nodes(), ["", "", "b"])
+
+    def test_a_server_that_is_full_and_names_no_other_is_an_error(self):
+        self.played.script = ["a", Fault(grpc.StatusCode.RESOURCE_EXHAUSTED, "MEMORY_BUDGET_FULL", node="not a node")]
+        self.client.session(NAME)
+        with self.assertRaises(tissueform.LimitExceeded):
+            self.client.session(NAME)
 
     def test_a_lost_call_is_repeated_in_a_cluster_only(self):
         self.played.script = [Fault(LOST), "a", Fault(LOST), "b"]
@@ -196,6 +211,19 @@ class ClusterTest(unittest.TestCase):
         with self.client.session(NAME).drag() as drag, self.assertRaises(tissueform.Conflict) as caught:
             drag.move({"end": Pose()})
         self.assertEqual(caught.exception.reason, "SESSION_UPDATED")
+
+    def test_a_commit_that_fails_is_an_error_at_the_end_of_the_block(self):
+        with self.assertRaisesRegex(tissueform.ServerError, "not committed: the disk is full"):
+            with self.client.session(NAME).drag() as drag:
+                drag.move({"end": Pose()}, commit=True)
+
+    def test_an_error_of_the_progress_function_ends_the_upload(self):
+        self.played.chunks, self.played.committed, self.played.total = [], 0, 0
+
+        def report(done, total):
+            raise ZeroDivisionError
+        with self.assertLogs("grpc", "ERROR"), self.assertRaises(ZeroDivisionError):
+            self.client.upload_mesh(*sample_bar((20, 20, 20)), on_progress=report)
 
     def test_an_interrupted_upload_continues_where_it_was(self):
         self.played.chunks, self.played.committed, self.played.total = [], 0, 0

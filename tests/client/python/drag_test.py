@@ -77,12 +77,19 @@ class DragTest(unittest.TestCase):
         notices = []
         with make_session() as session, session.drag(on_notice=notices.append) as drag:
             drag.move(shifted(2), commit=True)
-            drag.close()
-            list(drag)
+            drag.finish()
             self.assertEqual(drag.last_committed, 1)
             session.refresh()
             self.assertEqual(session.committed_poses["end"].translation_mm, (0, 2, 0))
         self.assertTrue(any(notice.HasField("committed") for notice in notices))
+
+    def test_the_end_of_the_block_waits_for_a_commit(self):
+        with make_session() as session:
+            with session.drag() as drag:
+                drag.send(shifted(2), commit=True)
+            self.assertEqual(drag.last_committed, 1)
+            session.refresh()
+            self.assertEqual(session.committed_poses["end"].translation_mm, (0, 2, 0))
 
     def test_ctrl_c_in_the_middle_ends_the_drag_and_leaves_the_session(self):
         with make_session() as session:
@@ -92,6 +99,12 @@ class DragTest(unittest.TestCase):
                 drag.receive()  # nothing more comes
             with session.drag() as again:
                 self.assertEqual(again.move(shifted(1)).sequence, 1)
+
+    def test_a_block_s_own_error_is_not_hidden_by_a_server_that_is_gone(self):
+        with start_server() as other, other.connect() as own:
+            with self.assertRaises(ZeroDivisionError), make_session(own):
+                other.close()
+                raise ZeroDivisionError
 
     def test_an_exception_in_the_block_ends_the_drag(self):
         with make_session() as session:
@@ -148,6 +161,12 @@ class AsyncDragTest(unittest.IsolatedAsyncioTestCase):
                 drag.close()
                 sequences = [frame.sequence async for frame in drag]
         self.assertEqual(sequences[-1], 6)
+
+    async def test_the_end_of_the_block_waits_for_a_commit(self):
+        with make_session() as session:
+            async with session.async_drag() as drag:
+                drag.send(shifted(2), commit=True)
+            self.assertEqual(drag.drag.last_committed, 1)
 
     async def test_several_drags_run_side_by_side(self):
         with make_session() as session:
