@@ -35,7 +35,7 @@ from .fitting import Fit, FitTarget, FittedTarget, Freedom  # noqa: E402
 from .local import LocalServer, local  # noqa: E402
 from .meshes import Mesh  # noqa: E402
 from .poses import Pose, ras_to_lps  # noqa: E402
-from .predictions import Frame, Prediction, Prepared  # noqa: E402
+from .predictions import Frame, MaterialRanges, Prediction, Prepared  # noqa: E402
 from .prepared_answers import PreparedAnswers  # noqa: E402
 from .sample_meshes import sample_bar  # noqa: E402
 from .sessions import FIXED_BONE, ContactRow, Session  # noqa: E402
@@ -44,7 +44,7 @@ from .stored_predictions import Export, Measure, StoredPrediction  # noqa: E402
 __all__ = [
     "AccessDenied", "AsyncDrag", "Cancelled", "Client", "Conflict", "ContactRow", "DataDamaged", "DeadlineExceeded", "DoctorLine", "Drag",
     "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded", "LocalServer",
-    "Measure", "Mesh", "NotFound", "Pose", "Prediction", "Prepared", "PreparedAnswers", "ServerError", "ServerInfo", "ServerUnavailable",
+    "MaterialRanges", "Measure", "Mesh", "NotFound", "Pose", "Prediction", "Prepared", "PreparedAnswers", "ServerError", "ServerInfo", "ServerUnavailable",
     "Session", "StoredPrediction", "Tls", "TissueformError", "Unauthenticated", "connect", "doctor", "from_meshio", "local", "ras_to_lps",
     "sample_bar", "to_meshio", "to_pyvista",
 ]

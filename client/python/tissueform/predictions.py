@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Mapping, Optional, Sequence, Union
+from typing import Any, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -71,7 +71,8 @@ class Prediction:
     vertices: numbers in the mesh of these vertices, (#V,) int32; None: all, in order (or the skin, of Session.predict; a drag knows
     the numbers). summary: how it was found (v1.SolveSummary: converged, iterations, solve_seconds, load, obstacle, prepared,
     error_bound_mm, ...); an answer that has not converged is not an error. quality: tets that are inverted and volumes
-    (v1.DeformationQuality); only of Session.predict. uncertainty_p95_mm: (#V,) float32 where ranges of the material were given.
+    (v1.DeformationQuality); only of Session.predict. uncertainty_p95_mm: (#V,) float32 where ranges of the material were given: the
+    vertex is within it in 95 of 100 cases if only the material is uncertain.
     """
 
     positions: Positions
@@ -114,14 +115,37 @@ def frame_of(message: deform_service_pb2.DeformFrame, vertices: Optional[npt.NDA
 
 
 @dataclasses.dataclass(frozen=True)
+class MaterialRanges:
+    """What is not known of the material, for the uncertainty of linear_elastic and neo_hookean. tissues: of each tet of the mesh, (#T,)
+    integers below len(factors_95). factors_95: for each tissue x from 1 to 10: its stiffness is between 1/x and x times the session's in
+    95 of 100 cases. poisson_ratio: (lowest, highest) in 95 of 100 cases, around the session's own; None: known."""
+
+    tissues: npt.ArrayLike
+    factors_95: Sequence[float]
+    poisson_ratio: Optional[Tuple[float, float]] = None
+
+
+@dataclasses.dataclass(frozen=True)
 class Prepared:
     """Prepared answers: a frame is then a small product instead of a solve. tolerance_mm: largest distance of a vertex from the
     direct answer. max_rotation: largest rotation of a handle in radians that is covered. max_estimate_mm: of neo_hookean, the largest
-    estimated error that is covered. None: the server's value. Poses that are not covered are answered directly."""
+    estimated error that is covered. None: the server's value. ranges: answers have uncertainty_p95_mm. Poses that are not covered are
+    answered directly."""
 
     tolerance_mm: Optional[float] = None
     max_rotation: Optional[float] = None
     max_estimate_mm: Optional[float] = None
+    ranges: Optional[MaterialRanges] = None
+
+
+def _ranges_to_proto(ranges: MaterialRanges) -> deform_service_pb2.MaterialRanges:
+    tissues = np.asarray(ranges.tissues)
+    if tissues.ndim != 1 or tissues.dtype.kind not in "iu" or not (0 <= tissues.min(initial=0) and tissues.max(initial=0) < len(ranges.factors_95)):
+        raise InvalidInput(f"tissues have the shape {tissues.shape} and the type {tissues.dtype}: expected integers from 0 to "
+                           f"{len(ranges.factors_95) - 1} for each tet, (#T,)")
+    lowest, highest = ranges.poisson_ratio or (None, None)
+    return deform_service_pb2.MaterialRanges(tissues=tissues.astype(np.uint8).tobytes(), factors_95=ranges.factors_95,
+                                             lowest_poisson_ratio=lowest, highest_poisson_ratio=highest)
 
 
 def prepared_to_proto(prepared: Union[bool, Prepared]) -> Optional[deform_service_pb2.PreparedAnswers]:
@@ -130,4 +154,5 @@ def prepared_to_proto(prepared: Union[bool, Prepared]) -> Optional[deform_servic
         return None
     options = Prepared() if prepared is True else prepared
     return deform_service_pb2.PreparedAnswers(tolerance_mm=options.tolerance_mm, max_rotation=options.max_rotation,
-                                              max_estimate_mm=options.max_estimate_mm)
+                                              max_estimate_mm=options.max_estimate_mm,
+                                              ranges=None if options.ranges is None else _ranges_to_proto(options.ranges))

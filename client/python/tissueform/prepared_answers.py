@@ -68,7 +68,8 @@ class PreparedAnswers:
         summary = deform_service_pb2.SolveSummary(converged=True, prepared=True, load=1.0, error_bound_mm=0.0 if is_estimate else error,
                                                   error_estimate_mm=error if is_estimate else 0.0)
         positions.flags.writeable = False
-        return Prediction(positions, summary, self.vertices)
+        band = self._evaluator.band(own).astype(np.float32)
+        return Prediction(positions, summary, self.vertices, None, band if len(band) > 0 else None)
 
     def predict(self, poses: Poses) -> Prediction:
         """As evaluate; asks the server (Session.predict with the same vertices and model) where the poses are not covered."""

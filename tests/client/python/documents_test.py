@@ -66,8 +66,8 @@ class ExampleTest(unittest.TestCase):
 
 class SpeedTest(unittest.TestCase):
     def test_import_is_fast(self):
-        def seconds(modules):
-            script = f"import time; start = time.perf_counter(); import {modules}; print(time.perf_counter() - start)"
+        def seconds(modules):  # of the processor: other programs of the machine do not count
+            script = f"import time; start = time.process_time(); import {modules}; print(time.process_time() - start)"
             return float(subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, check=True).stdout)
         self.assertLessEqual(min(seconds("tissueform") for _ in range(3)), MAX_IMPORT_SECONDS)
 

@@ -48,7 +48,7 @@ def main():
     for path in (folder / "package/tissueform").rglob("*.py"):
         ast.parse(path.read_text(), feature_version=(3, 9))
     if shutil.which("mypy"):
-        subprocess.run(["mypy", "--strict", "--cache-dir", folder / "mypy", "tissueform"], cwd=folder / "package", check=True)
+        subprocess.run(["mypy", "--strict", "--cache-dir", f"{folder}_types", "tissueform"], cwd=folder / "package", check=True)
     venv.create(folder / "venv", system_site_packages=True, with_pip=True)
     subprocess.run([folder / "venv/bin/pip", "install", "--quiet", "--no-deps", "--no-index", wheel], check=True)
 

@@ -109,6 +109,24 @@ class PreparedAnswersTest(unittest.TestCase):
                 self.assertLessEqual(np.abs(found.positions - direct.positions).max(), found.summary.error_bound_mm + 1e-4)
                 self.assertGreaterEqual(found.positions[side, 0].min(), -0.02)
 
+    def test_the_uncertainty_of_the_material_is_that_of_a_drag(self):
+        tissues = np.zeros(mesh.tet_count, dtype=int)
+        tissues[:200] = 1
+        ranges = tissueform.MaterialRanges(tissues, factors_95=[1.8, 2.2], poisson_ratio=(0.4, 0.47))
+        prepared = tissueform.Prepared(ranges=ranges)
+        with make_session(model="linear_elastic") as session, session.drag(prepared=prepared) as drag:
+            frame = drag.move(BEND)
+            here = session.prepared_answers(prepared=prepared).evaluate(BEND)
+            self.assertEqual(frame.uncertainty_p95_mm.shape, (144,))
+            self.assertGreater(frame.uncertainty_p95_mm.max(), 0.01)
+            # Its columns are compressed (docs/prepared-answers.md), those of the server's frames are not.
+            largest = frame.uncertainty_p95_mm.max()
+            np.testing.assert_allclose(here.uncertainty_p95_mm, frame.uncertainty_p95_mm, rtol=0, atol=0.1 * largest)
+            self.assertIsNone(session.prepared_answers().evaluate(BEND).uncertainty_p95_mm)
+            wrong = tissueform.MaterialRanges(tissues, factors_95=[1.8])
+            with self.assertRaisesRegex(tissueform.InvalidInput, "from 0 to 0 for each tet"):
+                session.drag(prepared=tissueform.Prepared(ranges=wrong))
+
     def test_poses_beyond_their_range_are_asked_of_the_server(self):
         far = {"end": Pose(rotation_vector=(0, 0, 2))}
         with make_session() as session:
