@@ -156,6 +156,20 @@ class StoredPredictionTest(unittest.TestCase):
             client.prediction(stored.name)
 
 
+    def test_an_export_waits_for_a_bridge_until_it_is_withdrawn(self):
+        with make_session() as session:
+            stored = session.store_prediction(BEND, case="cases/" + "0" * 64)
+        export = stored.export([tissueform.Measure("own_1", "Tip", "mm", before=1.0, after=2.5)])
+        self.assertEqual((export.state, export.prediction, export.stored_objects), ("waiting", stored.name, 0))
+        self.assertEqual(stored.export().name, export.name)  # one at a time
+        self.assertEqual(list(client.exports.list(stored.name)), [export])
+        client.exports.delete(export.name)
+        with self.assertRaises(tissueform.NotFound):
+            client.exports.get(export.name)
+        with self.assertRaisesRegex(tissueform.InvalidInput, "unit"):
+            stored.export([tissueform.Measure("own_1", "Tip", "inch", before=1.0, after=2.5)])
+
+
 class SessionTest(unittest.TestCase):
     def test_fit_finds_the_pose_that_was_used(self):
         with make_session() as session:
