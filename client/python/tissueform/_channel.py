@@ -8,6 +8,7 @@ import dataclasses
 import os
 import pathlib
 import re
+import ssl
 import stat
 import threading
 from typing import Any, Optional, Union
@@ -29,6 +30,8 @@ _OPTIONS = [
 _MAX_TOKEN_BYTES = 16 << 10
 _TOKEN = re.compile(r"[A-Za-z0-9._~+/=-]+")
 _LOOPBACK = re.compile(r"(localhost|\[::1\]|127\.\d{1,3}\.\d{1,3}\.\d{1,3}):\d+")
+
+_AUTHORITIES_OF_LINUX = ("/etc/ssl/certs/ca-certificates.crt", "/etc/pki/tls/certs/ca-bundle.crt", "/etc/ssl/ca-bundle.pem")
 
 PathLike = Union[str, "os.PathLike[str]"]
 
@@ -104,6 +107,21 @@ def _bytes_of(path: Optional[PathLike]) -> Optional[bytes]:
         raise NotFound(f"cannot read {os.fspath(path)}: {error.strerror}", advice="check the files of tls") from error
 
 
+def _system_authorities() -> Optional[bytes]:
+    """This machine's, which grpcio does not read: it has its own list. None: not found, then that list counts."""
+    for path in (ssl.get_default_verify_paths().cafile, *_AUTHORITIES_OF_LINUX):
+        if path is not None and os.path.isfile(path):
+            return _bytes_of(path)
+    return None
+
+
+def _tls_credentials(files: Tls) -> Any:
+    if (files.certificate is None) != (files.key is None):
+        raise InvalidInput("a client certificate needs its key, and a key its certificate", advice="give both or none in Tls")
+    authorities = _system_authorities() if files.ca is None else _bytes_of(files.ca)
+    return grpc.ssl_channel_credentials(authorities, _bytes_of(files.key), _bytes_of(files.certificate))
+
+
 def open_channel(address: str, token: Token, tls: Union[None, bool, Tls], insecure: bool) -> Any:
     """A grpc.Channel. A token goes to another machine only over TLS.
 
@@ -112,9 +130,7 @@ def open_channel(address: str, token: Token, tls: Union[None, bool, Tls], insecu
     if re.fullmatch(r"unix:.+|[^/\s]+:\d{1,5}", address) is None:
         raise InvalidInput(f'"{address}" is not an address: give HOST:PORT or unix:/PATH', advice="for example localhost:50051")
     if tls:
-        files = tls if isinstance(tls, Tls) else Tls()
-        credentials = grpc.ssl_channel_credentials(_bytes_of(files.ca), _bytes_of(files.key), _bytes_of(files.certificate))
-        return grpc.secure_channel(address, credentials, options=_OPTIONS)
+        return grpc.secure_channel(address, _tls_credentials(tls if isinstance(tls, Tls) else Tls()), options=_OPTIONS)
     if not is_local(address) and token:
         raise InvalidInput(f"the token would go to {address} unencrypted", advice="give tls=True or tls=Tls(ca=...), or no token")
     if not is_local(address) and not insecure:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._calls import Backoff, Caller
-from .errors import DataDamaged, DeadlineExceeded, InvalidInput, NotFound, TissueformError, error_of_call, is_transient
+from .errors import DataDamaged, DeadlineExceeded, InvalidInput, LimitExceeded, NotFound, TissueformError, error_of_call, is_transient
 from .v1 import mesh_service_pb2, mesh_service_pb2_grpc
 
 Points = npt.NDArray[np.float64]
@@ -152,11 +152,7 @@ def _may_repeat(error: TissueformError, damaged_before: bool) -> bool:
         return not damaged_before
     if error.reason in ("UPLOAD_NOT_FOUND", "CHUNK_OUT_OF_PLACE", "CHANGED_MEANWHILE", "UPLOAD_UNDER_WAY"):
         return True
-    return isinstance(error, DeadlineExceeded) or (is_transient(error) and not _is_full(error))
-
-
-def _is_full(error: TissueformError) -> bool:
-    return error.reason in ("MEMORY_BUDGET_FULL", "MESH_TOO_LARGE", "DISK_FULL", "QUOTA_EXCEEDED", "LIMIT_EXCEEDED")
+    return isinstance(error, DeadlineExceeded) or (is_transient(error) and not isinstance(error, LimitExceeded))
 
 
 class MeshCalls:

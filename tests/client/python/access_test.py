@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 
 import jwt
 import tissueform
@@ -81,6 +82,12 @@ class LoginTest(unittest.TestCase):
                 tissueform.connect(server.address, token=wrong, tls=tls())
         with self.assertRaises(tissueform.NotFound):
             tissueform.connect(server.address, token_file="/nowhere/token", tls=tls())
+
+    def test_true_means_the_authorities_of_this_machine(self):
+        with unittest.mock.patch.dict(os.environ, {"SSL_CERT_FILE": f"{folder.name}/cert.pem"}):
+            tissueform.connect(server.address, token=token(), tls=True).close()
+        with self.assertRaisesRegex(tissueform.InvalidInput, "needs its key"):
+            tissueform.connect(server.address, tls=Tls(certificate=f"{folder.name}/cert.pem"))
 
     def test_a_certificate_of_another_authority_is_refused(self):
         with self.assertRaises(tissueform.ServerUnavailable):
