@@ -21,6 +21,8 @@ def stated_versions(root):
     yield "client/web/package.json", package["version"]
     yield "client/web/package-lock.json", lock["version"]
     yield "client/web/package-lock.json, packages", lock["packages"][""]["version"]
+    python = (root / "client/python/pyproject.toml").read_text(encoding="utf-8")
+    yield "client/python/pyproject.toml", re.search(r'^version = "([^"]+)"', python, re.MULTILINE)[1]
     released = re.search(r"^## \[(\d[^\]]*)\]", (root / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     yield "CHANGELOG.md, newest heading", released[1] if released else "none"
 

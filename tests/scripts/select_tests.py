@@ -93,9 +93,11 @@ def include_graph(root, paths):
 
 
 def rule_of(path):
-    """"source", "web", "text", "scripts", "tests" (a file that belongs to the tests of its folder), or "everything"."""
+    """"source", "web", "python", "text", "scripts", "tests" (a file that belongs to the tests of its folder), or "everything"."""
     if path.startswith("client/web/"):
         return "web"
+    if path.startswith("client/python/"):
+        return "python"
     if TEXT.search(path):
         return "text"
     if SOURCE.search(path):
@@ -112,6 +114,8 @@ def is_selected(entry, rules, sources, links, reads_docs):
     if entry.name.startswith("scripts.") and not entry.starts_programs:
         return True
     if rules.get("web") and (entry.needs_planner or entry.name.startswith(("client_web.", "e2e."))):
+        return True
+    if rules.get("python") and entry.name.startswith("client_python."):
         return True
     if any(str(pathlib.PurePosixPath(path).parent) == entry.folder for path in rules.get("tests", ())):
         return True

@@ -25,10 +25,11 @@ SOLVE = Entry("core_mechanics", "core_mechanics_test", "tests/core/mechanics", F
 COMMAND = Entry("client_cli", "client_cli_test", "tests/client/cli", False, True)
 WEB = Entry("client_web.test", "", "tests/client/web", False, True)
 BROWSER = Entry("e2e.planner", "", "tests/e2e", True, True)
+PYTHON = Entry("client_python.drag", "", "tests/client/python", False, False)
 CHAOS = Entry("cluster.chaos", "", "tests/cluster", True, False)
 STYLE = Entry("scripts.style", "", "tests/scripts", False, False)
 LINKS = Entry("scripts.links", "", "tests/scripts", True, False)
-ALL = [MESH, SOLVE, COMMAND, WEB, BROWSER, CHAOS, STYLE, LINKS]
+ALL = [MESH, SOLVE, COMMAND, WEB, BROWSER, PYTHON, CHAOS, STYLE, LINKS]
 FOLDERS = {
     "core_mesh_test": {"tests/core/mesh", "core/mesh"},
     "core_mechanics_test": {"tests/core/mechanics", "core/mechanics", "core/mesh"},
@@ -65,6 +66,7 @@ class Select(unittest.TestCase):
 
     def test_the_planner_leaves_core_alone(self):
         self.assertEqual(selected("client/web/src/main.ts"), [COMMAND, WEB, BROWSER, STYLE])
+        self.assertEqual(selected("client/python/tissueform/drag.py"), [PYTHON, STYLE])
 
     def test_the_page_has_the_evaluator_of_core(self):
         self.assertEqual(selected("core/mechanics/answer_evaluator/answer_bytes.cc"), [COMMAND, WEB, BROWSER, CHAOS, STYLE, LINKS])

@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""Compares the Python package's drag with that of the C++ client: same plan, model, vertices and rate, alternating on one server.
+
+  time_python_drag.py PROGRAMS PLAN    by a Python that has the package: BUILD/test_scratch/python_package/venv/bin/python
+
+Prints medians of the rounds in ms: from sending a pose to having its frame, how long prepared answers take to evaluate in Python, and how
+long a frame of 100,000 vertices takes to decode. PLAN: with handles and fixed vertices by point_data.
+"""
+
+import json
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import meshio
+import numpy as np
+import tissueform
+from tissueform import Pose
+from tissueform.predictions import frame_of
+from tissueform.v1 import deform_service_pb2
+
+ROUNDS, SECONDS, RATES = 5, 3, (30, 300, 1000)
+
+
+def vertices_of(region, mesh):
+    return mesh.point_data[region["point_data"]] == region["equals"]
+
+
+def make_session(client, plan, folder):
+    mesh = meshio.read(folder / plan["mesh"])
+    uploaded = client.upload_mesh(*tissueform.from_meshio(mesh))
+    handles = {handle["name"]: vertices_of(handle["region"], mesh) for handle in plan["handles"]}
+    return client.create_session(uploaded, fixed=vertices_of(plan["fixed"], mesh), handles=handles, model="linear_elastic")
+
+
+def python_ms(session, rate):
+    times = []
+    with session.drag(vertices="skin", prepared=True) as drag:
+        drag.move({})
+        begin = time.perf_counter()
+        for i in range(SECONDS * rate):
+            time.sleep(max(0, begin + i / rate - time.perf_counter()))
+            start = time.perf_counter()
+            drag.move({session.handles[0]: Pose(translation_mm=(0, 0.02 * (i % 100), 0))})
+            times.append(1000 * (time.perf_counter() - start))
+    return statistics.median(times)
+
+
+def command_ms(programs, plan, address, folder, rate):
+    out = pathlib.Path(folder, "load.json")
+    subprocess.run([programs / "tissueform", "load", "--plan", plan, "--server", address, "--sessions", "1", "--churn", "0", "--seconds", str(SECONDS),
+                    "--rate", str(rate), "--model", "linear_elastic", "--json", out], check=True, capture_output=True)
+    return json.loads(out.read_text())["drags"][0]["latency_ms"]["p50"]
+
+
+def median_ms(function, calls=200):
+    times = []
+    for _ in range(calls):
+        start = time.perf_counter()
+        function()
+        times.append(1000 * (time.perf_counter() - start))
+    return statistics.median(times)
+
+
+def decode_ms():
+    data = deform_service_pb2.DeformFrame(sequence=1, positions=np.zeros((100_000, 3), dtype=np.float32).tobytes()).SerializeToString()
+    return median_ms(lambda: frame_of(deform_service_pb2.DeformFrame.FromString(data), None))
+
+
+def main():
+    programs, path = map(pathlib.Path, sys.argv[1:])
+    plan = json.loads(path.read_text())
+    with tissueform.local(programs / "tissueform-server") as server, server.connect() as client, tempfile.TemporaryDirectory() as folder:
+        with make_session(client, plan, path.parent) as session:
+            for rate in RATES:
+                rounds = [(python_ms(session, rate), command_ms(programs, path, server.address, folder, rate)) for _ in range(ROUNDS)]
+                python, command = (statistics.median(times) for times in zip(*rounds))
+                print(f"{rate} poses/s: Python {python:.2f} ms, C++ {command:.2f} ms, ratio {python / command:.2f}")
+            answers = session.prepared_answers(vertices="skin")
+            pose = {session.handles[0]: Pose(translation_mm=(0, 2, 0))}
+            print(f"prepared answers of the skin, evaluated here: {median_ms(lambda: answers.evaluate(pose)):.2f} ms")
+    print(f"decoding 100,000 vertices: {decode_ms():.2f} ms")
+
+
+if __name__ == "__main__":
+    main()
