@@ -14,6 +14,7 @@
 #include <Eigen/Core>
 
 #include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/problem/plan_problem.h"
 
@@ -95,6 +96,7 @@ struct Plan {
   GradientFieldOptions gradient_field;  // what the plan says; the rest keeps its defaults
   std::optional<PlannedUncertainty> uncertainty;
   std::vector<PlannedContactRow> contact;  // empty: tissue sticks to bone
+  std::optional<LipEdge> lip_edge = {};    // that a seal may close; only with contact
 };
 
 }  // namespace tissueform

@@ -51,7 +51,7 @@ absl::StatusOr<Plan> ParsePlan(std::string_view json, const std::string& folder,
 // missing array, a value without stiffness, stiffness <= 0, an empty selection (the message names
 // the handle or "fixed"), a mesh that is not the one of plan.mesh_sha256. A mesh that ends with
 // ".tfcase" is that of a case; then also the errors of ReadCase. With contact rows also those of
-// ResolveContact and WeldSeam.
+// ResolveContact, ResolveLipEdge and WeldSeam.
 absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, const ResolveOptions& options = {});
 
 // The same upon a mesh that is in memory, in the plan's own coordinate system: no file is read, and

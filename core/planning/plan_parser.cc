@@ -98,7 +98,11 @@ absl::StatusOr<Plan> ToPlan(const Json& json, const std::string& folder) {
   if (json.contains("uncertainty")) {
     TF_ASSIGN_OR_RETURN(plan.uncertainty, ToUncertainty(json.at("uncertainty")));
   }
-  if (json.contains("contact")) plan.contact = ContactFromJson(json.at("contact"));
+  if (json.contains("contact")) {
+    const Json& contact = json.at("contact");
+    plan.contact = ContactFromJson(contact);
+    if (contact.contains("seal")) plan.lip_edge = LipEdgeFromJson(contact.at("seal"));
+  }
   return plan;
 }
 

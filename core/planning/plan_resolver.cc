@@ -114,6 +114,10 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file,
   TF_ASSIGN_OR_RETURN(std::vector<HandlePose> poses, ResolvePoses(plan));
   TF_ASSIGN_OR_RETURN(std::shared_ptr<const TetMesh> mesh,
                       ToLps(plan.coordinate_system, file.mesh));
+  std::optional<LipEdge> lip_edge;
+  if (contact_use == ContactUse::kOn) {
+    TF_ASSIGN_OR_RETURN(lip_edge, ResolveLipEdge(plan, mesh->positions(), constraints.contact()));
+  }
   DeformerOptions deformer;
   deformer.model = plan.model;
   deformer.preparation.poisson_ratio = plan.poisson_ratio;
@@ -127,6 +131,7 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file,
                      .constraints = std::move(constraints),
                      .poses = std::move(poses),
                      .contact_use = contact_use,
+                     .lip_edge = std::move(lip_edge),
                      .freed = std::move(freed),
                      .deformer = std::move(deformer),
                      .uncertainty = std::move(uncertainty)};

@@ -100,6 +100,32 @@ absl::StatusOr<std::vector<ContactRow>> ResolveContact(const Plan& plan) {
   return rows;
 }
 
+LipEdge LipEdgeFromJson(const Json& seal) {
+  LipEdge edge{.up = VectorFromJson(seal.at("up")), .pairs = {}};
+  for (const Json& pair : seal.at("pairs")) {
+    edge.pairs.push_back({.upper = pair[0].get<int32_t>(), .lower = pair[1].get<int32_t>()});
+  }
+  return edge;
+}
+
+Json LipEdgeToJson(const LipEdge& edge, CoordinateSystem system) {
+  Json json = {{"up", ToJson(Eigen::Vector3d(SignsToLps(system).cwiseProduct(edge.up)))},
+               {"pairs", Json::array()}};
+  for (const LipEdge::Pair& pair : edge.pairs) {
+    json["pairs"].push_back(Json::array({pair.upper, pair.lower}));
+  }
+  return json;
+}
+
+absl::StatusOr<std::optional<LipEdge>> ResolveLipEdge(const Plan& plan, const Positions& rest,
+                                                      const std::vector<ContactRow>& rows) {
+  if (!plan.lip_edge) return std::nullopt;
+  LipEdge edge = *plan.lip_edge;
+  edge.up = SignsToLps(plan.coordinate_system).cwiseProduct(edge.up);
+  TF_RETURN_IF_ERROR(CheckLipEdge(edge, rest, rows));
+  return edge;
+}
+
 absl::StatusOr<std::vector<FreedVertex>> FreeTouchingVertices(const std::vector<ContactRow>& rows,
                                                               std::vector<int32_t>* fixed,
                                                               std::vector<HandleRegion>* handles) {

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "nlohmann/json_fwd.hpp"
 
 #include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/problem/plan_problem.h"
 #include "core/planning/plan.h"
 
@@ -27,6 +29,14 @@ nlohmann::json ContactToJson(const std::vector<ContactRow>& rows,
 // The plan's rows in LPS, their handles by their places in the plan. Vertices and normals are
 // checked by ConstraintSet. Errors: InvalidArgument, naming the row, for an unknown handle.
 absl::StatusOr<std::vector<ContactRow>> ResolveContact(const Plan& plan);
+
+// The key "seal" of "contact", in the same coordinate system. REQUIRES: it has passed the schema.
+LipEdge LipEdgeFromJson(const nlohmann::json& seal);
+nlohmann::json LipEdgeToJson(const LipEdge& edge, CoordinateSystem system);  // of an edge in LPS
+
+// The plan's edge of the lips in LPS, if it has one. Errors: those of CheckLipEdge.
+absl::StatusOr<std::optional<LipEdge>> ResolveLipEdge(const Plan& plan, const Positions& rest,
+                                                      const std::vector<ContactRow>& rows);
 
 // Takes the vertices that the rows name out of the regions, and says where they were.
 //

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mesh/tet_mesh.h"
 #include "tests/testing/meshes.h"
 
@@ -62,6 +63,16 @@ class PartedBlock {
 
   ConstraintSet Constraints() const {
     return *ConstraintSet::Create(mesh, {0, 1, 2, 3, 4, 5, 6, 7, 8}, {{"top", Top()}}, rows);
+  }
+
+  // The front of the cut, at y = 2 mm.
+  LipEdge Edge() const {
+    LipEdge edge;
+    for (const ContactRow& row : rows) {
+      if (row.other == ContactRow::kBone || mesh.positions()(row.vertex, 1) != 2) continue;
+      edge.pairs.push_back({.upper = row.vertex, .lower = row.other});
+    }
+    return edge;
   }
 
   inline static const std::vector<int32_t> kSliding = {9, 12, 15};

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+
 #include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/result_writer.h"
 #include "client/cli/shared/stage_progress.h"
@@ -15,6 +17,7 @@
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
 #include "core/planning/model_names.h"
 #include "core/planning/plan_io.h"
@@ -28,6 +31,7 @@ struct DeformOptions {
   std::string out;
   std::string model;
   std::string stats;
+  bool seal = false;
   int threads = AvailableProcessors();
   int solver_threads = 1;
 };
@@ -43,6 +47,31 @@ absl::StatusOr<Plan> ReadChosenPlan(const DeformOptions& options) {
     TF_ASSIGN_OR_RETURN(plan.model, ModelFromName(options.model));
   }
   return plan;
+}
+
+absl::Status CheckSeal(const DeformOptions& options, const Plan& plan) {
+  if (!options.seal) return absl::OkStatus();
+  if (!options.reading.resolve.contact) {
+    return absl::InvalidArgumentError(
+        "--seal needs lips that are parted, and --contact off joins them; leave one of the two "
+        "out");
+  }
+  if (!plan.lip_edge) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--seal: plan ", options.plan,
+        " has no \"seal\" in \"contact\": it is older, of the planner, or its lips are not parted or apart in "
+        "the CT; build it again with \"lips\": {\"part\": true}, or leave --seal out"));
+  }
+  if (plan.model == DeformationModel::kLinearElastic) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("--seal: the model ", ModelName(plan.model),
+                   " does not compute the lip seal; use --model linear_elastic"));
+}
+
+absl::StatusOr<std::unique_ptr<Deformer>> CreateChosenDeformer(
+    const std::shared_ptr<MeshPreparation>& preparation, const PlanProblem& problem, bool seal) {
+  if (seal) return CreateSealedLipsDeformer(preparation, *problem.lip_edge);
+  return CreateDeformer(preparation, problem.deformer);
 }
 
 absl::StatusOr<PlanProblem> ResolveWithProgress(const Plan& plan, const ResolveOptions& options,
@@ -61,7 +90,7 @@ absl::StatusOr<Deformation> Solve(Deformer* deformer, absl::Span<const HandlePos
 }
 
 // Fills `stats` as far as preparing and solving know it.
-absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* stats) {
+absl::StatusOr<Positions> Predict(const PlanProblem& problem, bool seal, PredictionStats* stats) {
   std::shared_ptr<MeshPreparation> preparation;
   std::unique_ptr<Deformer> deformer;
   {
@@ -72,12 +101,13 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* s
     TF_ASSIGN_OR_RETURN(
         preparation, MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
                                              problem.deformer.preparation));
-    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(preparation, problem.deformer));
+    TF_ASSIGN_OR_RETURN(deformer, CreateChosenDeformer(preparation, problem, seal));
   }
   TF_ASSIGN_OR_RETURN(Deformation deformation, Solve(deformer.get(), problem.poses));
   stats->preparation = deformer->preparation();
   stats->solve = deformation.summary;
   stats->contact = SummarizeContact(deformation.contact, problem.deformer.model);
+  stats->seal = deformation.seal;
   stats->quality = MeasureDeformation(*problem.mesh, deformation.positions);
   stats->band = FindMaterialBandOrWarn(problem, deformation.positions, std::move(preparation));
   return std::move(deformation.positions);
@@ -86,6 +116,7 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, PredictionStats* s
 absl::Status RunDeform(const DeformOptions& options) {
   TF_RETURN_IF_ERROR(CheckOutputs(options));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
+  TF_RETURN_IF_ERROR(CheckSeal(options, plan));
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(PlanProblem problem,
                       ResolveWithProgress(plan, options.reading.resolve, &read_seconds));
@@ -94,9 +125,9 @@ absl::Status RunDeform(const DeformOptions& options) {
   PredictionStats stats = StatsOf(problem);
   stats.solver_threads = options.solver_threads;
   stats.read_seconds = read_seconds;
-  TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, &stats));
-  TF_RETURN_IF_ERROR(
-      WriteResult(options.out, plan, problem, deformed, stats.band ? &*stats.band : nullptr));
+  TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, options.seal, &stats));
+  TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed,
+                                 stats.band ? &*stats.band : nullptr, stats.seal));
   if (!options.stats.empty()) {
     stats.elastic = SummarizeElastic(problem, deformed);
     TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
@@ -125,12 +156,13 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   AddSolverThreads(command, "", &options->solver_threads);
-  AddPlanOptions(command, &options->reading);
+  AddPlanOptions(command, &options->reading, &options->seal);
   command->footer(
       "Examples:\n"
       "  tissueform deform plan.json --out after.vtu\n"
       "  tissueform deform plan.json --out after.vtu --model neo_hookean --stats stats.json\n"
       "  tissueform deform plan.json --out sticking.vtu --contact off\n"
+      "  tissueform deform plan.json --out sealed.vtu --model linear_elastic --seal\n"
       "Open after.vtu in ParaView or 3D Slicer; displacement_mm is the movement of each vertex.\n"
       "Elastic models add stress, strain energy and reaction forces (docs/plan-format.md).");
   command->callback([options, work] { *work = [options] { return RunDeform(*options); }; });

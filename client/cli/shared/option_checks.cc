@@ -28,12 +28,30 @@ std::string NonFinite(const std::string& text) {
                                                                  : "";
 }
 
+void AddSeal(CLI::App* command, bool* seal) {
+  if (seal != nullptr) {
+    command->add_flag("--seal", *seal,
+                      "keep lips closed that are closed in the CT, unless the mouth is opened; "
+                      "only linear_elastic with contact (docs/lips.md)");
+    return;
+  }
+  command
+      ->add_flag_callback("--seal",
+                          [] {
+                            throw CLI::ValidationError(
+                                "--seal",
+                                "this command does not compute the lip seal; use tissueform deform "
+                                "PLAN --out OUT.vtu --seal");
+                          })
+      ->group("");  // not in --help
+}
+
 }  // namespace
 
 CLI::Validator VtuEnding() { return Ending(".vtu", "OUT.vtu"); }
 CLI::Validator VtpEnding() { return Ending(".vtp", "FILE.vtp"); }
 
-void AddPlanOptions(CLI::App* command, PlanReadOptions* options) {
+void AddPlanOptions(CLI::App* command, PlanReadOptions* options, bool* seal) {
   command->add_flag("--allow-outside", options->allow_outside,
                     "allow a mesh outside the plan's folder");
   command
@@ -43,6 +61,7 @@ void AddPlanOptions(CLI::App* command, PlanReadOptions* options) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"on", true}, {"off", false}})
                       .description("{on,off}"))
       ->default_str("on");
+  AddSeal(command, seal);
 }
 
 void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) {

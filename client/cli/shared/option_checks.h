@@ -18,9 +18,9 @@ CLI::Validator VtuEnding();
 // The same for surfaces with arrays: .vtp.
 CLI::Validator VtpEnding();
 
-// Adds --allow-outside and --contact to a command that reads a plan. `options` outlives the
-// parsing.
-void AddPlanOptions(CLI::App* command, PlanReadOptions* options);
+// Adds --allow-outside and --contact to a command that reads a plan, and --seal to one that can
+// seal lips; the others refuse it and say which command can. Both pointers outlive the parsing.
+void AddPlanOptions(CLI::App* command, PlanReadOptions* options, bool* seal = nullptr);
 
 // Adds --solver-threads, for a command that makes factors alone in its process: what is given to
 // SetBlasThreads while it prepares. `threads` outlives the parsing and holds the default, 1.

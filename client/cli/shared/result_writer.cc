@@ -34,10 +34,20 @@ std::vector<Attribute> WithoutOld(std::vector<Attribute> arrays,
   return arrays;
 }
 
+Attribute SealArray(const LipEdge& edge, const SealAnswer& seal, Eigen::Index num_vertices) {
+  std::vector<uint8_t> of_vertex(static_cast<size_t>(num_vertices), 0);
+  for (const LipEdge::Pair& pair : edge.pairs) {
+    of_vertex[static_cast<size_t>(pair.upper)] = seal.released ? 3 : 1;
+    of_vertex[static_cast<size_t>(pair.lower)] = seal.released ? 3 : 2;
+  }
+  return {kLipSealArray, 1, std::move(of_vertex)};
+}
+
 }  // namespace
 
 absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanProblem& problem,
-                         const Positions& deformed, const MaterialBand* band) {
+                         const Positions& deformed, const MaterialBand* band,
+                         const std::optional<SealAnswer>& seal) {
   std::error_code ignored;
   if (std::filesystem::equivalent(path, plan.mesh_path, ignored)) {
     return absl::FailedPreconditionError(
@@ -53,16 +63,17 @@ absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanPr
   const PrincipalValues strains = PrincipalGreenStrains(ElementsOf(*problem.mesh), deformed,
                                                         problem.deformer.preparation.threads);
   TF_ASSIGN_OR_RETURN(TetMesh mesh, TetMesh::Create(std::move(written), problem.mesh->tets()));
-  TetMeshFile file{
-      std::move(mesh),
-      WithoutOld(problem.point_data, {kDisplacementArray, kReactionForceArray,
-                                      kMaterialUncertaintyArray, kMaterialUncertaintyNormalArray}),
-      WithoutOld(problem.cell_data,
-                 {kPrincipalStrainArray, kVonMisesStressArray, kEnergyDensityArray})};
+  TetMeshFile file{std::move(mesh),
+                   WithoutOld(problem.point_data,
+                              {kDisplacementArray, kReactionForceArray, kMaterialUncertaintyArray,
+                               kMaterialUncertaintyNormalArray, kLipSealArray}),
+                   WithoutOld(problem.cell_data,
+                              {kPrincipalStrainArray, kVonMisesStressArray, kEnergyDensityArray})};
   file.point_data.push_back(RowsArray(kDisplacementArray, displacement));
   file.cell_data.push_back(RowsArray(kPrincipalStrainArray, strains));
   AddElasticArrays(problem, deformed, &file);
   if (band != nullptr) AddMaterialBand(*band, &file);
+  if (seal) file.point_data.push_back(SealArray(*problem.lip_edge, *seal, deformed.rows()));
   return WriteTetMesh(path, file);
 }
 

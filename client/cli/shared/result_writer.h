@@ -3,12 +3,14 @@
 
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "absl/status/status.h"
 
 #include "client/cli/shared/uncertainty_results.h"
 #include "core/base/types.h"
+#include "core/mechanics/deformation/deformer.h"
 #include "core/mechanics/problem/plan_problem.h"
 #include "core/planning/plan.h"
 
@@ -19,6 +21,9 @@ inline constexpr char kDisplacementArray[] = "displacement_mm";
 // Cell array of every result: the three principal Green-Lagrange strains of each tet, the largest
 // first.
 inline constexpr char kPrincipalStrainArray[] = "principal_strain";
+// Of lips that were asked to be sealed, on vertices: 1 at the upper lip's edge, 2 at the lower
+// lip's, which is held; 3 at both where the lips were released.
+inline constexpr char kLipSealArray[] = "lip_seal";
 
 // Writes OUT.vtu: the plan's mesh with its points at `deformed` (#V by 3, LPS), written in the
 // plan's own coordinate system; a point array displacement_mm of three doubles; the cell array
@@ -29,6 +34,7 @@ inline constexpr char kPrincipalStrainArray[] = "principal_strain";
 // Errors: FailedPrecondition when `path` is the plan's own mesh; Internal when a position is not
 // finite; those of WriteTetMesh.
 absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanProblem& problem,
-                         const Positions& deformed, const MaterialBand* band = nullptr);
+                         const Positions& deformed, const MaterialBand* band = nullptr,
+                         const std::optional<SealAnswer>& seal = std::nullopt);
 
 }  // namespace tissueform

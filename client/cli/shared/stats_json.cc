@@ -11,6 +11,7 @@
 #include "client/cli/shared/uncertainty_text.h"
 #include "client/cli/shared/version.h"
 #include "core/base/atomic_file.h"
+#include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/model_names.h"
 
@@ -56,7 +57,19 @@ OrderedJson ContactToJson(const PredictionStats& stats) {
   json["pressing_rows"] = stats.contact->pressing_rows;
   if (stats.contact->max_force_n) json["max_force_n"] = *stats.contact->max_force_n;
   json["residual_mm"] = stats.contact->residual_mm;
+  if (stats.seal) {
+    json["seal"] = {{"pairs", stats.seal->pairs},
+                    {"released", stats.seal->released},
+                    {"parted_mm", stats.seal->parted_mm},
+                    {"release_mm", kSealReleaseMm}};
+  }
   return json;
+}
+
+std::string SealText(const SealAnswer& seal) {
+  if (!seal.released) return absl::StrFormat("sealed: %d pairs, released: no", seal.pairs);
+  return absl::StrFormat("sealed: 0 of %d pairs, released: yes (parted by %.1f mm, limit %.0f mm)",
+                         seal.pairs, seal.parted_mm, kSealReleaseMm);
 }
 
 std::string ContactText(const PredictionStats& stats) {
@@ -71,6 +84,7 @@ std::string ContactText(const PredictionStats& stats) {
     absl::StrAppendFormat(&text, ", largest force %.3g N", *stats.contact->max_force_n);
   }
   absl::StrAppendFormat(&text, ", residual %.2g mm", stats.contact->residual_mm);
+  if (stats.seal) absl::StrAppend(&text, ", ", SealText(*stats.seal));
   return text;
 }
 

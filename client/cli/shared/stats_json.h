@@ -35,6 +35,7 @@ struct PredictionStats {
   ContactUse contact_use = ContactUse::kNone;
   size_t contact_rows = 0;                // that were used
   std::optional<ContactSummary> contact;  // of answers with rows that may lift off
+  std::optional<SealAnswer> seal;         // of lips that were asked to be sealed
   DeformationQuality quality;
   std::optional<ElasticSummary> elastic;  // of the elastic models
   bool has_ranges = false;                // the plan gives ranges of the material

@@ -31,6 +31,10 @@ constexpr double kBeyondEdgeMm = 2;
 // So far behind the front of the upper teeth the seam goes on. They are thicker, and their front
 // lies within 2 mm of the polynomial.
 constexpr double kBehindArchMm = 3;
+// The skin of the mesh, which is smooth, and that of the CT differ by less between closed lips.
+constexpr double kAtMouthLineMm = 4;
+// Between the points of a line that the CT shows.
+constexpr double kLineStepMm = 1;
 // The seam's slope is never steeper than over this length.
 constexpr double kShortestSeamMm = 1;
 
@@ -151,6 +155,14 @@ double LipSeam::HeightMm(const Eigen::Vector3d& place_mm) const {
 
 bool LipSeam::Holds(const Eigen::Vector3d& place_mm) const {
   return IsBeside(place_mm, 0) && BeforeArchMm(place_mm, kCranium) > -kBehindArchMm;
+}
+
+bool LipSeam::ClosesAt(const Eigen::Vector3d& place_mm) const {
+  const FaceCoordinates at = axes_.Of(place_mm);
+  if (std::abs(at.front - OnLine(at.left).front) > kAtMouthLineMm) return false;
+  return std::ranges::none_of(line_.points, [&at](const MouthLinePoint& point) {
+    return point.parted && std::abs(point.at.left - at.left) < kLineStepMm;
+  });
 }
 
 bool LipSeam::IsBeside(const Eigen::Vector3d& place_mm, double margin_mm) const {

@@ -51,6 +51,10 @@ class LipSeam {
   // Whether a place of height 0 is on it.
   bool Holds(const Eigen::Vector3d& place_mm) const;
 
+  // Whether the lips close on the skin at a place on the seam: it lies at most 4 mm behind or
+  // before the mouth line, and the CT shows no air between the lips there.
+  bool ClosesAt(const Eigen::Vector3d& place_mm) const;
+
   // Whether a place lies between the corners, or at most so far beside them.
   bool IsBeside(const Eigen::Vector3d& place_mm, double margin_mm) const;
   // How far a place lies before the front of that jaw (kCranium or kMandible).

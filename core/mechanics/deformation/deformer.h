@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -66,10 +67,21 @@ struct ContactAnswer {
   double residual_mm = 0;
 };
 
+// Of lips that were asked to be sealed.
+struct SealAnswer {
+  int64_t pairs = 0;
+  // How far the edges are parted along `up` at most before they are sealed.
+  double parted_mm = 0;
+  bool released = false;  // that is too far for a seal: the answer is the one without it
+
+  friend bool operator==(const SealAnswer&, const SealAnswer&) = default;
+};
+
 struct Deformation {
   Positions positions;  // #V by 3, mm
   SolveSummary summary;
   ContactAnswer contact = {};
+  std::optional<SealAnswer> seal = {};
 };
 
 // How an answer is sought, for models that iterate.

@@ -97,8 +97,7 @@ absl::Status ElasticContact::SolveForRows(
     TF_RETURN_IF_ERROR(cancellation.Check());
     const Eigen::Index count = std::min(kRowsPerPass, num_rows - first);
     TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
-                        elastic_.Solve(directions_.middleCols(first, count),
-                                       Eigen::MatrixXd::Zero(3 * num_constrained_, count)));
+                        Respond(directions_.middleCols(first, count)));
     take(first, responses);
   }
   return absl::OkStatus();
@@ -140,13 +139,15 @@ absl::StatusOr<Eigen::MatrixXd> ElasticContact::ForceColumns(
   return columns;
 }
 
+absl::StatusOr<Eigen::MatrixXd> ElasticContact::Respond(const Eigen::MatrixXd& forces) const {
+  return elastic_.Solve(forces, Eigen::MatrixXd::Zero(3 * num_constrained_, forces.cols()));
+}
+
 absl::StatusOr<Eigen::VectorXd> ElasticContact::Displacements(
     std::span<const double> forces) const {
   const Eigen::Map<const Eigen::VectorXd> l(forces.data(),
                                             static_cast<Eigen::Index>(forces.size()));
-  TF_ASSIGN_OR_RETURN(
-      const Eigen::MatrixXd displacements,
-      elastic_.Solve(directions_ * l, Eigen::MatrixXd::Zero(3 * num_constrained_, 1)));
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements, Respond(directions_ * l));
   return displacements.col(0);
 }
 

@@ -39,7 +39,8 @@ class ElasticContact {
       const TetMesh& mesh, const ConstraintSet& constraints, const ElasticSystem& elastic,
       const FactorAdmission& admission, const Cancellation& cancellation = {});
 
-  const std::vector<int32_t>& rows() const { return rows_; }  // indices in the constraint set
+  const std::vector<int32_t>& rows() const { return rows_; }      // indices in the constraint set
+  const SparseMatrix& directions() const { return directions_; }  // N^T, 3 #V by #rows
   // mm per Pa mm^2; #rows by #rows, symmetric to the bit, positive semi-definite.
   const Eigen::MatrixXd& compliance() const { return compliance_; }
   const Eigen::MatrixXd& gap_columns() const { return gap_columns_; }    // Q, #rows by 12 #handles
@@ -49,6 +50,9 @@ class ElasticContact {
   Eigen::VectorXd Gaps(const Eigen::VectorXd& coefficients) const {
     return gap_columns_ * coefficients + gaps_at_rest_;
   }
+  // K^-1 f, 3 #V by k in mm, of forces on vertices (3 #V by k, Pa mm^2) while all bone rests.
+  // Errors: those of ElasticSystem::Solve.
+  absl::StatusOr<Eigen::MatrixXd> Respond(const Eigen::MatrixXd& forces) const;
   // K^-1 N^T l, 3 #V in mm, of contact forces in Pa mm^2. Errors: those of ElasticSystem::Solve.
   absl::StatusOr<Eigen::VectorXd> Displacements(std::span<const double> forces) const;
 
@@ -73,7 +77,7 @@ class ElasticContact {
 
   const ElasticSystem& elastic_;
   std::vector<int32_t> rows_;
-  SparseMatrix directions_;  // N^T, 3 #V by #rows
+  SparseMatrix directions_;
   Eigen::MatrixXd compliance_;
   Eigen::MatrixXd gap_columns_;
   std::vector<int32_t> boundary_;     // vertices, rising

@@ -9,6 +9,7 @@
 #include "absl/types/span.h"
 
 #include "core/base/cancellation.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/deformer.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
 
@@ -23,8 +24,23 @@ namespace tissueform {
 absl::StatusOr<std::unique_ptr<Deformer>> CreateLinearElasticDeformer(
     std::shared_ptr<MeshPreparation> preparation, const Cancellation& cancellation = {});
 
-// The same answer by back-substitution with the prescribed displacements, which the columns are
-// checked against and compared with in speed. The residual is that of the linear system.
+// Lips whose edges differ by more than this along LipEdge::up are not sealed: the mouth is open.
+// Operations move the jaws by up to about 10 mm against each other (docs/lips.md).
+inline constexpr double kSealReleaseMm = 12;
+
+// The same model with a one-way lip seal: posture, not mechanics. It solves with the lips free,
+// takes the heights of the upper lip's edge from there, prescribes them to the lower lip's edge and
+// solves again. Deformation::seal says whether the lips were released. Each answer costs two
+// back-substitutions.
+//
+// Errors: those of CheckLipEdge, LipSeal::Create and CreateLinearElasticDeformer.
+absl::StatusOr<std::unique_ptr<Deformer>> CreateSealedLipsDeformer(
+    std::shared_ptr<MeshPreparation> preparation, const LipEdge& edge,
+    const Cancellation& cancellation = {});
+
+// The same answer as CreateLinearElasticDeformer by back-substitution with the prescribed
+// displacements, which the columns are checked against and compared with in speed. The residual is
+// that of the linear system.
 //
 // Errors: those of Deformer::Deform and of MeshPreparation::Elastic.
 absl::StatusOr<Deformation> SolveLinearElasticDirectly(MeshPreparation* preparation,

@@ -13,6 +13,7 @@
 #include "core/base/types.h"
 #include "core/mechanics/constraints/constraint_set.h"
 #include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/uncertainty/material_uncertainty.h"
 #include "core/mesh/attribute.h"
@@ -60,7 +61,8 @@ struct PlanProblem {
   ConstraintSet constraints;
   std::vector<HandlePose> poses;  // one per handle of `constraints`
   ContactUse contact_use = ContactUse::kNone;
-  std::vector<FreedVertex> freed = {};  // by vertex, rising
+  std::optional<LipEdge> lip_edge = {};  // that a seal may close; only with contact
+  std::vector<FreedVertex> freed = {};   // by vertex, rising
   DeformerOptions deformer;
   std::optional<MaterialUncertainty> uncertainty;  // what the plan says is not known
 };

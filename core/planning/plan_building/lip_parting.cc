@@ -179,6 +179,21 @@ class ContactRows {
   Positions normals_;
 };
 
+// REQUIRES: the doubles are in the mesh and in the regions.
+LipEdge EdgeOf(const LipSeam& seam, const std::vector<int32_t>& originals,
+               const Eigen::Vector3d& up, const Positions& positions,
+               const PlanningRegions& regions) {
+  LipEdge edge{.up = up, .pairs = {}};
+  const Eigen::Index welded = positions.rows() - static_cast<Eigen::Index>(originals.size());
+  for (size_t k = 0; k < originals.size(); ++k) {
+    const int32_t upper = originals[k];
+    const bool is_skin = regions.skin_region[static_cast<size_t>(upper)] != 0;
+    if (!is_skin || !seam.ClosesAt(positions.row(upper))) continue;
+    edge.pairs.push_back({.upper = upper, .lower = static_cast<int32_t>(welded + k)});
+  }
+  return edge;
+}
+
 std::vector<uint8_t> BitsOf(const std::vector<ContactRow>& rows, Eigen::Index num_vertices) {
   std::vector<uint8_t> bits(static_cast<size_t>(num_vertices), 0);
   for (const ContactRow& row : rows) {
@@ -255,6 +270,8 @@ absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnato
   NameLips(seam.seam, made->mesh, regions);
   AppendDoubles(parted.original_of_double, regions);
   made->mesh = std::move(parted.mesh);
+  LipEdge edge =
+      EdgeOf(seam.seam, parted.original_of_double, anatomy.up, made->mesh.positions(), *regions);
   std::vector<uint8_t> contact = BitsOf(rows, made->mesh.num_vertices());
   return PartedLips{.line = seam.seam.line(),
                     .vestibule_mm = anatomy.vestibule_mm,
@@ -263,6 +280,7 @@ absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnato
                     .original_of_double = std::move(parted.original_of_double),
                     .wall = std::move(parted.wall),
                     .rows = std::move(rows),
+                    .edge = std::move(edge),
                     .contact = std::move(contact)};
 }
 

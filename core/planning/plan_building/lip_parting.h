@@ -17,6 +17,7 @@
 #include "core/imaging/anatomy/lip_seam.h"
 #include "core/imaging/anatomy/mouth_line.h"
 #include "core/mechanics/constraints/contact_row.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/planning/plan_building/planning_regions.h"
 #include "core/planning/plan_building/recipe.h"
 #include "core/planning/plan_building/soft_tissue_mesh.h"
@@ -56,6 +57,7 @@ struct PartedLips {
   std::vector<int32_t> original_of_double;  // see PartedMesh
   TriangleIndices wall;
   std::vector<ContactRow> rows;  // handles are those of the segments, in their order
+  LipEdge edge;                  // without pairs where the CT shows air between the lips
   std::vector<uint8_t> contact;  // #V, of the bits above
 };
 
@@ -76,6 +78,7 @@ struct VestibuleAnatomy {
 //  * tissue with up to 5 mm of air before a jaw may meet it (unilateral, with that gap);
 //  * a vertex of the seam and its double may lift off each other (unilateral).
 // Bone behind the teeth holds what it held: its vertices on the seam stay one.
+// The lips' edge is what of the seam lies on the skin at the mouth line (LipSeam::ClosesAt).
 // Normals of bone are those of its dental arch, laid into the plane square to `up`: with normals
 // turned up at the incisors' edges tissue slips off them.
 absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnatomy& anatomy,

@@ -73,6 +73,9 @@ std::string PlanJson(const PlanBuild& build) {
   if (build.lips) {
     plan["contact"] =
         ContactToJson(build.lips->rows, NamesOf(build.segments), CoordinateSystem::kLps);
+    if (!build.lips->edge.pairs.empty()) {
+      plan["contact"]["seal"] = LipEdgeToJson(build.lips->edge, CoordinateSystem::kLps);
+    }
   }
   plan["version"] = LowestPlanVersion(plan);
   return plan.dump(2) + "\n";
@@ -100,6 +103,7 @@ Plan PlanOf(const PlanBuild& build) {
     // As with poses: what is read back.
     plan.contact = ContactFromJson(
         ContactToJson(build.lips->rows, NamesOf(build.segments), CoordinateSystem::kLps));
+    if (!build.lips->edge.pairs.empty()) plan.lip_edge = build.lips->edge;
   }
   plan.model = build.recipe.model;
   if (const auto factors = FactorsOf(build.recipe.tissues)) {

@@ -4,6 +4,7 @@
 #include "core/planning/planned_contact.h"
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -239,6 +240,65 @@ TEST(PlannedContactTest, NotNumbersAndTooManyRowsAreRefused) {
   EXPECT_THAT(Parse(plan), IsRefused("/contact/rows"));
   while (plan["contact"]["rows"].size() <= kMaxContactRows) plan["contact"]["rows"].push_back(row);
   EXPECT_THAT(Parse(plan), IsRefused("/contact/rows"));
+}
+
+Json PlanWithSeal(CoordinateSystem system = CoordinateSystem::kLps) {
+  const PartedBlock block;
+  Json plan = PlanOfBlock(block.rows, system);
+  plan["contact"]["seal"] = LipEdgeToJson(block.Edge(), system);
+  return plan;
+}
+
+TEST(PlannedContactTest, TheLipsEdgeComesBackAndIsForContactOnly) {
+  LipEdge edge = PartedBlock().Edge();
+  ASSERT_THAT(edge.pairs, SizeIs(3));
+  for (const CoordinateSystem system : {CoordinateSystem::kLps, CoordinateSystem::kRas}) {
+    edge.up = Eigen::Vector3d(1, -2, 3).normalized();
+    Json plan = PlanWithSeal(system);
+    plan["contact"]["seal"] = LipEdgeToJson(edge, system);
+    EXPECT_EQ(LowestPlanVersion(plan), 4);
+    ASSERT_OK_AND_ASSIGN(const PlanProblem problem, Resolve(plan));
+    EXPECT_EQ(problem.lip_edge, edge);
+    ASSERT_OK_AND_ASSIGN(const PlanProblem off, Resolve(plan, {.contact = false}));
+    EXPECT_EQ(off.lip_edge, std::nullopt);
+  }
+  ASSERT_OK_AND_ASSIGN(const PlanProblem without, Resolve(PlanOfBlock(PartedBlock().rows)));
+  EXPECT_EQ(without.lip_edge, std::nullopt);
+}
+
+TEST(PlannedContactTest, BadEdgesAreNamed) {
+  const auto [upper, lower] = PartedBlock().Edge().pairs[0];
+  const Json good = {upper, lower};
+  const struct {
+    const char* key;
+    Json value;
+    std::string why;
+  } cases[] = {
+      {"up", {0, 0, 2}, "contact seal: \"up\" has length 2; it must be 1"},
+      {"up", {0, 0, 0}, "contact seal: \"up\" has length 0"},
+      {"up", {0, 1}, "/contact/seal/up"},
+      {"pairs", Json::array(), "/contact/seal/pairs"},
+      {"pairs", {{upper}}, "/contact/seal/pairs/0"},
+      {"pairs", {{upper, -1}}, "/contact/seal/pairs/0/1: -1"},
+      {"pairs", {good, {5000, 3}}, "contact seal: pair 1 names vertex 5000, but the mesh has"},
+      {"pairs", {good, good}, "contact seal: pair 1 names vertex"},
+      {"pairs", {{upper, upper}}, "again; a vertex belongs to one pair"},
+      {"pairs", {{upper, 20}}, "of pair 0 are not at one place at rest; remove the pair"},
+      {"strength", 3, "unknown key \"strength\""},
+  };
+  for (const auto& bad : cases) {
+    Json plan = PlanWithSeal();
+    plan["contact"]["seal"][bad.key] = bad.value;
+    EXPECT_THAT(Resolve(plan), IsRefused(bad.why)) << bad.value;
+  }
+  Json plan = PlanWithSeal();
+  plan["contact"].erase("rows");
+  EXPECT_THAT(Resolve(plan), IsRefused("missing key \"rows\""));
+  plan = PlanWithSeal();
+  std::erase_if(
+      plan["contact"]["rows"].get_ref<Json::array_t&>(),
+      [lower = lower](const Json& row) { return row.value("other_vertex", -1) == lower; });
+  EXPECT_THAT(Resolve(plan), IsRefused("pair 0 has no contact row between its vertices; add it"));
 }
 
 TEST(PlannedContactTest, ARegionKeepsAVertexWithoutRows) {

@@ -427,6 +427,54 @@ TEST_F(DeformTest, ContactIsReportedAndCanBeTurnedOff) {
   EXPECT_NE(Read("off.vtu"), Read("on.vtu"));
 }
 
+TEST_F(DeformTest, LipsAreSealedWhenAskedAndTheResultSaysSo) {
+  const PartedBlock block;
+  ASSERT_THAT(
+      WriteTetMesh(Path("mesh.vtu"), {.mesh = block.mesh, .point_data = {}, .cell_data = {}}),
+      IsOk());
+  nlohmann::json plan = BarPlan();
+  plan.erase("mesh_sha256");
+  plan["version"] = 4;
+  plan["mesh"] = "mesh.vtu";
+  plan["model"] = "linear_elastic";
+  plan["stiffness"] = {{"uniform", 15000}};
+  plan["fixed"] = {{"vertices", PartedBlock::Fixed()}};
+  plan["handles"] = {{{"name", "top"},
+                      {"region", {{"vertices", PartedBlock::Top()}}},
+                      {"pose", {{"translation_mm", {0.0, 0.0, 0.5}}}}}};
+  plan["contact"] = ContactToJson(block.rows, {"top"}, CoordinateSystem::kLps);
+  const auto seal = [this](const std::vector<std::string>& more) {
+    std::vector<std::string> args = {"deform", "plan.json", "--out", "a.vtu", "--seal"};
+    args.insert(args.end(), more.begin(), more.end());
+    return Run(args);
+  };
+  Write("plan.json", plan.dump());
+  EXPECT_THAT(seal({}).err, HasSubstr("has no \"seal\" in \"contact\""));
+
+  plan["contact"]["seal"] = LipEdgeToJson(block.Edge(), CoordinateSystem::kLps);
+  Write("plan.json", plan.dump());
+  const ProcessResult sealed = seal({"--stats", "sealed.json"});
+  ASSERT_THAT(sealed, Succeeds());
+  EXPECT_THAT(sealed.out, HasSubstr(", sealed: 3 pairs, released: no\n"));
+  const auto stats = nlohmann::json::parse(Read("sealed.json"))["contact"]["seal"];
+  EXPECT_EQ(stats["pairs"], 3);
+  EXPECT_EQ(stats["released"], false);
+  EXPECT_GT(stats["parted_mm"], 0.1);
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("a.vtu")));
+  const std::vector<double> marks = ToDoubles(*FindAttribute(result.point_data, "lip_seal"));
+  const LipEdge edge = block.Edge();
+  EXPECT_EQ(std::ranges::count(marks, 0.0), static_cast<std::ptrdiff_t>(marks.size()) - 6);
+  EXPECT_EQ(marks[static_cast<size_t>(edge.pairs[0].upper)], 1);
+  EXPECT_EQ(marks[static_cast<size_t>(edge.pairs[0].lower)], 2);
+
+  EXPECT_THAT(seal({"--contact", "off"}).err, HasSubstr("--contact off joins them"));
+  EXPECT_THAT(seal({"--model", "arap"}).err, HasSubstr("arap does not compute the lip seal"));
+  for (const std::string command : {"run", "drag", "compare"}) {
+    EXPECT_THAT(Run({command, "plan.json", "--seal"}).err,
+                HasSubstr("this command does not compute the lip seal; use tissueform deform"));
+  }
+}
+
 TEST_F(DeformTest, ContactIsOnOrOff) {
   WriteBar();
   const ProcessResult result =

@@ -119,6 +119,20 @@ TEST_F(LipSeamTest, NormalsAreTheArchsLaidIntoAPlane) {
   EXPECT_NEAR(seam_.BeforeArchMm({0, -55, 0}, kMandible), 7, 0.5);
 }
 
+TEST_F(LipSeamTest, LipsCloseAtTheLineWhereTheCtShowsNoAir) {
+  MouthLine line = MadeLine();
+  const double middle = (line.points.front().at.left + line.points.back().at.left) / 2;
+  for (MouthLinePoint& point : line.points) point.parted = point.at.left > middle;
+  const LipSeam seam = *LipSeam::Create(line, MadeParts(), MadeLandmarks());
+  for (const double left : {-20.0, -10.0, 10.0, 20.0}) {
+    const double front = SkinFront(left);
+    EXPECT_TRUE(seam_.ClosesAt({left, -front, LineUp(left)})) << left;
+    EXPECT_TRUE(seam_.ClosesAt({left, 3 - front, LineUp(left)})) << left;
+    EXPECT_FALSE(seam_.ClosesAt({left, 6 - front, LineUp(left)})) << left;
+    EXPECT_EQ(seam.ClosesAt({left, -front, LineUp(left)}), left < middle) << left;
+  }
+}
+
 TEST(LipSeamCreationTest, AJawThatShowsNoFrontIsNamed) {
   EXPECT_THAT(
       LipSeam::Create(MadeLine(), MadeParts(false), MadeLandmarks()).status(),

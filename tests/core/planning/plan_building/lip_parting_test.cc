@@ -3,7 +3,10 @@
 
 #include "core/planning/plan_building/lip_parting.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -82,6 +85,30 @@ void ExpectSoundRows(const PlanBuild& build) {
   EXPECT_EQ(build.regions.skin_region.size(), lips.contact.size());
 }
 
+// Pairs of the skin, between the corners, where the lips meet at the mouth line.
+void ExpectSoundEdge(const PlanBuild& build) {
+  const LipEdge& edge = build.lips->edge;
+  EXPECT_EQ(edge.up, build.head_frame.superior);
+  EXPECT_THAT(CheckLipEdge(edge, build.mesh.mesh.positions(), build.lips->rows), IsOk());
+  const FaceAxes axes(build.landmarks);
+  const std::vector<MouthLinePoint>& line = build.lips->line.points;
+  for (const LipEdge::Pair& pair : edge.pairs) {
+    const auto region_of = [&build](int32_t vertex) {
+      return static_cast<SkinRegion>(build.regions.skin_region[static_cast<size_t>(vertex)]);
+    };
+    EXPECT_EQ(region_of(pair.upper), SkinRegion::kUpperLip);
+    EXPECT_EQ(region_of(pair.lower), SkinRegion::kLowerLip);
+    const FaceCoordinates at = axes.Of(build.mesh.mesh.positions().row(pair.upper));
+    EXPECT_GT(at.left, line.front().at.left);
+    EXPECT_LT(at.left, line.back().at.left);
+    const auto nearest = std::ranges::min_element(line, {}, [&at](const MouthLinePoint& point) {
+      return std::abs(point.at.left - at.left);
+    });
+    EXPECT_NEAR(at.front, nearest->at.front, 5) << at.left;
+    EXPECT_FALSE(nearest->parted);
+  }
+}
+
 TEST(LipPartingTest, ABundledHeadGetsASeamAndRowsThatItsFilesSay) {
   ASSERT_OK_AND_ASSIGN(const PlanBuild build, BuildPlan(BundledCt(), BundledRecipe()));
   ASSERT_TRUE(build.lips.has_value());
@@ -101,6 +128,10 @@ TEST(LipPartingTest, ABundledHeadGetsASeamAndRowsThatItsFilesSay) {
   std::filesystem::remove_all(folder);
   EXPECT_EQ(read.constraints.contact(), direct.constraints.contact());
   EXPECT_EQ(read.constraints.contact().size(), build.lips->rows.size());
+  EXPECT_EQ(read.lip_edge, direct.lip_edge);
+  EXPECT_EQ(read.lip_edge.has_value(), !build.lips->edge.pairs.empty());
+  EXPECT_EQ(off.lip_edge, std::nullopt);
+  RecordProperty("pairs", static_cast<int>(build.lips->edge.pairs.size()));
   EXPECT_EQ(read.mesh->positions(), direct.mesh->positions());
   const auto doubles = static_cast<Eigen::Index>(build.lips->original_of_double.size());
   EXPECT_EQ(off.mesh->num_vertices(), read.mesh->num_vertices() - doubles);
@@ -138,6 +169,8 @@ TEST(LipPartingTest, WhenTheLowerJawOfAClosedMouthGoesBackTheUpperLipStays) {
   ASSERT_TRUE(files.ok());
   ASSERT_OK_AND_ASSIGN(const PlanBuild build, BuildPlan(files.Path("vhm_head"), PartingRecipe()));
   ExpectSoundRows(build);
+  ExpectSoundEdge(build);
+  EXPECT_GT(build.lips->edge.pairs.size(), 8U);
   EXPECT_GT(build.lips->original_of_double.size(), 40U);
   ASSERT_OK_AND_ASSIGN(const PlanProblem problem, ToPlanProblem(build));
   ASSERT_OK_AND_ASSIGN(const auto deformer, CreateDeformer(*problem.mesh, problem.stiffness,
