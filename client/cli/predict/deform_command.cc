@@ -59,7 +59,8 @@ absl::Status CheckSeal(const DeformOptions& options, const Plan& plan) {
   if (!plan.lip_edge) {
     return absl::InvalidArgumentError(absl::StrCat(
         "--seal: plan ", options.plan,
-        " has no \"seal\" in \"contact\": it is older, of the planner, or its lips are not parted or apart in "
+        " has no \"seal\" in \"contact\": it is older, of the planner, or its lips are not parted "
+        "or apart in "
         "the CT; build it again with \"lips\": {\"part\": true}, or leave --seal out"));
   }
   if (plan.model == DeformationModel::kLinearElastic) return absl::OkStatus();

@@ -165,6 +165,15 @@ bool LipSeam::ClosesAt(const Eigen::Vector3d& place_mm) const {
   });
 }
 
+double LipSeam::WidestStretchWithoutMm(const std::vector<Eigen::Vector3d>& places_mm) const {
+  std::vector<double> lefts = {line_.points.front().at.left, line_.points.back().at.left};
+  for (const Eigen::Vector3d& place : places_mm) lefts.push_back(axes_.Of(place).left);
+  std::ranges::sort(lefts);
+  double widest = 0;
+  for (size_t i = 1; i < lefts.size(); ++i) widest = std::max(widest, lefts[i] - lefts[i - 1]);
+  return widest;
+}
+
 bool LipSeam::IsBeside(const Eigen::Vector3d& place_mm, double margin_mm) const {
   const double left = axes_.Of(place_mm).left;
   return left >= line_.points.front().at.left - margin_mm &&

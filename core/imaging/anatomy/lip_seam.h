@@ -63,6 +63,10 @@ class LipSeam {
   Eigen::Vector3d Outward(const Eigen::Vector3d& place_mm, uint8_t jaw,
                           const Eigen::Vector3d& up) const;
 
+  // How long a stretch of the mouth from corner to corner, as seen from the front, has none of
+  // these places; all of it without any.
+  double WidestStretchWithoutMm(const std::vector<Eigen::Vector3d>& places_mm) const;
+
   const MouthLine& line() const { return line_; }
 
  private:

@@ -29,6 +29,9 @@ constexpr double kFacesLips = -0.5;
 constexpr double kFacesLipsThroughAir = 0.3;
 // Behind the front of a jaw, whose polynomial is true to about 2 mm.
 constexpr double kBehindFrontMm = 4;
+// Lips that do not touch along a wider stretch of the mouth are apart in the CT, and not sealed.
+// The Visible Human has vertices at most 4 mm apart there.
+constexpr double kWidestOpenStretchMm = 10;
 // How far from a vertex the voxel of the jaw is looked for that it lies on.
 constexpr int kSearchVoxels = 3;
 
@@ -184,13 +187,16 @@ LipEdge EdgeOf(const LipSeam& seam, const std::vector<int32_t>& originals,
                const Eigen::Vector3d& up, const Positions& positions,
                const PlanningRegions& regions) {
   LipEdge edge{.up = up, .pairs = {}};
+  std::vector<Eigen::Vector3d> places;
   const Eigen::Index welded = positions.rows() - static_cast<Eigen::Index>(originals.size());
   for (size_t k = 0; k < originals.size(); ++k) {
     const int32_t upper = originals[k];
     const bool is_skin = regions.skin_region[static_cast<size_t>(upper)] != 0;
     if (!is_skin || !seam.ClosesAt(positions.row(upper))) continue;
     edge.pairs.push_back({.upper = upper, .lower = static_cast<int32_t>(welded + k)});
+    places.emplace_back(positions.row(upper));
   }
+  if (seam.WidestStretchWithoutMm(places) > kWidestOpenStretchMm) edge.pairs.clear();
   return edge;
 }
 

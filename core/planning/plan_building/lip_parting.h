@@ -57,7 +57,7 @@ struct PartedLips {
   std::vector<int32_t> original_of_double;  // see PartedMesh
   TriangleIndices wall;
   std::vector<ContactRow> rows;  // handles are those of the segments, in their order
-  LipEdge edge;                  // without pairs where the CT shows air between the lips
+  LipEdge edge;                  // without pairs of lips that are apart in the CT
   std::vector<uint8_t> contact;  // #V, of the bits above
 };
 
@@ -78,7 +78,8 @@ struct VestibuleAnatomy {
 //  * tissue with up to 5 mm of air before a jaw may meet it (unilateral, with that gap);
 //  * a vertex of the seam and its double may lift off each other (unilateral).
 // Bone behind the teeth holds what it held: its vertices on the seam stay one.
-// The lips' edge is what of the seam lies on the skin at the mouth line (LipSeam::ClosesAt).
+// The lips' edge is what of the seam lies on the skin at the mouth line (LipSeam::ClosesAt); it is
+// empty where the lips do not touch along 10 mm or more.
 // Normals of bone are those of its dental arch, laid into the plane square to `up`: with normals
 // turned up at the incisors' edges tissue slips off them.
 absl::StatusOr<PartedLips> PartLips(const SeamInMesh& seam, const VestibuleAnatomy& anatomy,

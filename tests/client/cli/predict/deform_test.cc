@@ -467,6 +467,14 @@ TEST_F(DeformTest, LipsAreSealedWhenAskedAndTheResultSaysSo) {
   EXPECT_EQ(marks[static_cast<size_t>(edge.pairs[0].upper)], 1);
   EXPECT_EQ(marks[static_cast<size_t>(edge.pairs[0].lower)], 2);
 
+  plan["handles"][0]["pose"]["translation_mm"] = {0, 0, 40};
+  Write("plan.json", plan.dump());
+  const ProcessResult released = seal({});
+  ASSERT_THAT(released, Succeeds());
+  EXPECT_THAT(released.out, HasSubstr("sealed: 0 of 3 pairs, released: yes (parted by "));
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile open, ReadTetMesh(Path("a.vtu")));
+  EXPECT_EQ(std::ranges::count(ToDoubles(*FindAttribute(open.point_data, "lip_seal")), 3.0), 6);
+
   EXPECT_THAT(seal({"--contact", "off"}).err, HasSubstr("--contact off joins them"));
   EXPECT_THAT(seal({"--model", "arap"}).err, HasSubstr("arap does not compute the lip seal"));
   for (const std::string command : {"run", "drag", "compare"}) {

@@ -133,6 +133,15 @@ TEST_F(LipSeamTest, LipsCloseAtTheLineWhereTheCtShowsNoAir) {
   }
 }
 
+TEST_F(LipSeamTest, StretchesRunFromCornerToCorner) {
+  const double right = MadeLine().points.front().at.left;
+  const double left = MadeLine().points.back().at.left;
+  EXPECT_DOUBLE_EQ(seam_.WidestStretchWithoutMm({}), left - right);
+  const auto at = [](double x) { return Eigen::Vector3d(x, -SkinFront(x), LineUp(x)); };
+  EXPECT_NEAR(seam_.WidestStretchWithoutMm({at(left - 3), at(right + 4)}), left - right - 7, 1e-9);
+  EXPECT_NEAR(seam_.WidestStretchWithoutMm({at(right + 1), at(left - 30)}), 30, 1e-9);
+}
+
 TEST(LipSeamCreationTest, AJawThatShowsNoFrontIsNamed) {
   EXPECT_THAT(
       LipSeam::Create(MadeLine(), MadeParts(false), MadeLandmarks()).status(),
