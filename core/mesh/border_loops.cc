@@ -15,7 +15,9 @@ using NextOnBorder = std::multimap<int32_t, int32_t>;
 // Directed edges that one triangle has and no other, in either direction.
 NextOnBorder BorderEdges(const TriangleIndices& triangles) {
   std::map<std::pair<int32_t, int32_t>, int> uses;
-  const auto edge_key = [](int32_t a, int32_t b) { return std::pair(std::min(a, b), std::max(a, b)); };
+  const auto edge_key = [](int32_t a, int32_t b) {
+    return std::pair(std::min(a, b), std::max(a, b));
+  };
   for (const auto& t : triangles.rowwise()) {
     for (int k = 0; k < 3; ++k) ++uses[edge_key(t[k], t[(k + 1) % 3])];
   }

@@ -85,7 +85,8 @@ void MeasureDistances(const TriangleMesh& surface, const WrappingOptions& option
   const Eigen::VectorXd depth =
       DistancesToSurface(SamplePoints(surface, false), wrapped->mesh, options.threads);
   wrapped->largest_from_surface_mm = depth.maxCoeff();
-  wrapped->covered_fraction = (depth.array() > kCoveredDepth * options.offset_mm).cast<double>().mean();
+  wrapped->covered_fraction =
+      (depth.array() > kCoveredDepth * options.offset_mm).cast<double>().mean();
 }
 
 }  // namespace
@@ -107,9 +108,8 @@ double OffsetThatBridges(const TriangleMesh& surface) {
 absl::StatusOr<WrappedSurface> WrapSurface(const TriangleMesh& surface,
                                            const WrappingOptions& options) {
   TF_RETURN_IF_ERROR(CheckWrappable(surface, options.offset_mm));
-  TF_ASSIGN_OR_RETURN(TriangleMesh mesh,
-                      CallAlphaWrap(surface, kAlphaPerOffset * options.offset_mm,
-                                    options.offset_mm, options.limits));
+  TF_ASSIGN_OR_RETURN(TriangleMesh mesh, CallAlphaWrap(surface, kAlphaPerOffset * options.offset_mm,
+                                                       options.offset_mm, options.limits));
   WrappedSurface wrapped{.mesh = std::move(mesh)};
   MeasureDistances(surface, options, &wrapped);
   wrapped.volume_mm3 = ValidateTriangleMesh(wrapped.mesh).enclosed_volume_mm3;

@@ -30,8 +30,8 @@ std::vector<std::array<size_t, 3>> FacesOf(const TriangleMesh& surface) {
   std::vector<std::array<size_t, 3>> faces;
   faces.reserve(static_cast<size_t>(surface.num_triangles()));
   for (const auto& t : surface.triangles().rowwise()) {
-    faces.push_back({static_cast<size_t>(t[0]), static_cast<size_t>(t[1]),
-                     static_cast<size_t>(t[2])});
+    faces.push_back(
+        {static_cast<size_t>(t[0]), static_cast<size_t>(t[1]), static_cast<size_t>(t[2])});
   }
   return faces;
 }

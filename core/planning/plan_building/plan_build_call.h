@@ -20,6 +20,7 @@ namespace tissueform {
 struct PlanBuildRequest {
   std::string ct;           // file or folder, as BuildPlan takes it
   std::string recipe;       // file
+  std::string surfaces;     // file, instead of both, as BuildPlanFromSurfaces takes it
   std::string folder;       // is there and empty; gets the plan and its report
   std::string folder_name;  // what the answer calls it, for it may be renamed afterwards
   int threads = 1;          // the plan does not depend on it

@@ -17,8 +17,8 @@
 namespace tissueform {
 namespace {
 
-using ::testing::HasSubstr;
 using testing::BoxSurface;
+using ::testing::HasSubstr;
 using testing::SphereSurface;
 using testing::Together;
 using testing::WithHole;
