@@ -43,7 +43,7 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
                           OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
   }
   for (const std::string& note : build.ct.notes) {
-    absl::StrAppend(&made.text, "input   ", note, "\n");
+    absl::StrAppend(&made.text, request.surfaces.empty() ? "CT      " : "input   ", note, "\n");
   }
   absl::StrAppendFormat(&made.text, "report  %s/report.html: %s\n", request.folder_name,
                         made.ready

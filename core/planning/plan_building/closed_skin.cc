@@ -7,9 +7,8 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "absl/strings/str_format.h"
+#include <Eigen/Eigenvalues>
 
 #include "core/mesh/border_loops.h"
 
@@ -132,7 +131,8 @@ ClosedSkin CloseSkin(const TriangleMesh& skin, std::vector<std::string>* notes) 
     closed.caps = closed.caps ? Joined(*closed.caps, faces) : faces;
   }
   if (num_small > 0) {
-    notes->push_back(absl::StrFormat("Small openings of the skin that were closed: %d.", num_small));
+    notes->push_back(
+        absl::StrFormat("Small openings of the skin that were closed: %d.", num_small));
   }
   if (closed.caps) {
     notes->push_back(

@@ -24,8 +24,8 @@ constexpr double kBesideU = 1.37e-4;
 constexpr double kBesideV = 2.11e-4;
 
 struct Crossing {
-  double depth = 0;     // along the ray, in voxels
-  int8_t outward = 0;   // 1: the ray leaves the surface here when it runs to larger coordinates
+  double depth = 0;    // along the ray, in voxels
+  int8_t outward = 0;  // 1: the ray leaves the surface here when it runs to larger coordinates
 };
 
 // All rays along one axis: those through the voxels' centers of the plane of the other two.
@@ -84,7 +84,8 @@ class RaysAlongAxis {
  private:
   int Size(int axis) const { return geometry_.size[static_cast<size_t>(axis)]; }
   std::vector<Crossing>& RayAt(int u, int v) {
-    return crossings_[static_cast<size_t>(u) + static_cast<size_t>(v) * static_cast<size_t>(Size(u_))];
+    return crossings_[static_cast<size_t>(u) +
+                      static_cast<size_t>(v) * static_cast<size_t>(Size(u_))];
   }
   double Cross(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double u, double v) const {
     return (b[u_] - a[u_]) * (v - a[v_]) - (b[v_] - a[v_]) * (u - a[u_]);
@@ -97,8 +98,8 @@ class RaysAlongAxis {
     const double of_b = Cross(c, a, at_u, at_v) / twice_area;
     const double of_c = 1 - of_a - of_b;
     if (of_a < 0 || of_b < 0 || of_c < 0) return;
-    RayAt(u, v).push_back({of_a * a[w_] + of_b * b[w_] + of_c * c[w_],
-                           static_cast<int8_t>(twice_area > 0 ? 1 : -1)});
+    RayAt(u, v).push_back(
+        {of_a * a[w_] + of_b * b[w_] + of_c * c[w_], static_cast<int8_t>(twice_area > 0 ? 1 : -1)});
   }
 
   // Adds the crossing that an open end lacks, and returns its direction.
@@ -130,9 +131,7 @@ void VoteAlongAxis(const Positions& in_voxels, const TriangleIndices& triangles,
 
 }  // namespace
 
-bool OpenBox::any() const {
-  return low[0] || low[1] || low[2] || high[0] || high[1] || high[2];
-}
+bool OpenBox::any() const { return low[0] || low[1] || low[2] || high[0] || high[1] || high[2]; }
 
 SolidVoxels FindSolidVoxels(const TriangleMesh& surface, const GridGeometry& geometry, int threads,
                             const OpenBox& open) {

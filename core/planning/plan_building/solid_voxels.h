@@ -5,8 +5,8 @@
 
 #include <array>
 
-#include "core/imaging/anatomy/itk_filters.h"
 #include "core/imaging/anatomy/grid_operations.h"
+#include "core/imaging/anatomy/itk_filters.h"
 #include "core/mesh/triangle_mesh.h"
 
 namespace tissueform {
@@ -21,9 +21,9 @@ struct OpenBox {
 };
 
 struct SolidVoxels {
-  LabelGrid inside;          // 1 where most rays say so
+  LabelGrid inside;  // 1 where most rays say so
   double inside_mm3 = 0;
-  double turned_mm3 = 0;     // where most rays say that the surface faces inward
+  double turned_mm3 = 0;  // where most rays say that the surface faces inward
 };
 
 // The voxels whose centers a surface encloses. Along each of six directions (both ways along the

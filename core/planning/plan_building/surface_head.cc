@@ -47,8 +47,9 @@ absl::Status CheckSkinSize(const Eigen::AlignedBox3d& box) {
   if (size_mm >= kSmallestSkinMm && size_mm <= kLargestSkinMm) return absl::OkStatus();
   const char* unit = size_mm < 1 ? "m" : "cm";
   const std::string advice =
-      size_mm < 50 ? absl::StrCat("are its coordinates in another unit (\"units\": \"", unit, "\")?")
-                   : "check \"units\" or \"scale\"";
+      size_mm < 50
+          ? absl::StrCat("are its coordinates in another unit (\"units\": \"", unit, "\")?")
+          : "check \"units\" or \"scale\"";
   return absl::InvalidArgumentError(
       absl::StrFormat("the skin is %.3g mm long; a head with its neck is %g to %g mm: %s", size_mm,
                       kSmallestSkinMm, kLargestSkinMm, advice));
@@ -101,7 +102,8 @@ class HeadMaker {
     const Eigen::AlignedBox3d box = BoxOf(skin.skin);
     TF_RETURN_IF_ERROR(CheckSkinSize(box));
     const GridGeometry geometry = GridAround(box, spacing_mm);
-    TF_ASSIGN_OR_RETURN(LabelGrid head, SolidOf(skin.skin, "the skin", geometry, threads_, skin.open));
+    TF_ASSIGN_OR_RETURN(LabelGrid head,
+                        SolidOf(skin.skin, "the skin", geometry, threads_, skin.open));
     TellStage(tell, "filling bones with voxels", 0.2);
     TF_RETURN_IF_ERROR(FindBones(geometry));
     TF_RETURN_IF_ERROR(CheckUpright());
@@ -244,8 +246,7 @@ class HeadMaker {
 
   void MakeVoxels(LabelGrid head, const ClosedSkin& skin) {
     const GridGeometry& geometry = head.geometry;
-    const FloatGrid to_skin = DistancesNearBorder(
-        head, skin.WithCaps(), threads_);
+    const FloatGrid to_skin = DistancesNearBorder(head, skin.WithCaps(), threads_);
     FloatGrid to_bone(geometry, -INFINITY);
     for (const Bone& bone : bones_) {
       const FloatGrid to_this = DistancesNearBorder(bone.inside, *bone.mesh, threads_);

@@ -25,6 +25,8 @@
 #include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/payload/sha256.h"
 #include "core/mesh/surface_validation.h"
+#include "core/planning/plan_building/closed_skin.h"
+#include "core/planning/plan_building/segment_move.h"
 
 namespace tissueform {
 namespace {
@@ -34,6 +36,7 @@ namespace fs = std::filesystem;
 
 constexpr double kDefaultModulusKpa = 15;
 constexpr int kRecipeVersion = 4;
+constexpr size_t kMaxTransformBytes = size_t{1} << 16;
 
 // Turned neighbours at more edges than this part make inside and outside unclear.
 constexpr double kLargestTurnedFraction = 0.02;
@@ -83,6 +86,10 @@ class SurfacesReader {
     return absl::Status(mesh.status().code(), absl::StrCat(role, ": ", mesh.status().message()));
   }
 
+  std::string PathOf(const Json& file) const {
+    return (folder_ / file.get<std::string>()).string();
+  }
+
   // What was given and what was assumed.
   std::vector<std::string> Notes() const {
     std::vector<std::string> notes = {
@@ -100,10 +107,11 @@ class SurfacesReader {
                                                ", as the surfaces file states."
                                          : "not stated; LPS is assumed."));
     }
-    for (const auto& [space, name] : {std::pair(FileSpace::kRas, "RAS"), {FileSpace::kLps, "LPS"}}) {
+    for (const auto& [space, name] :
+         {std::pair(FileSpace::kRas, "RAS"), {FileSpace::kLps, "LPS"}}) {
       if (of_space_[space].empty()) continue;
-      notes.push_back(absl::StrCat("Axes of ", of_space_[space], ": ", name,
-                                   ", as the file's header states."));
+      notes.push_back(
+          absl::StrCat("Axes of ", of_space_[space], ": ", name, ", as the file's header states."));
     }
     return notes;
   }
@@ -113,7 +121,7 @@ class SurfacesReader {
 
  private:
   absl::StatusOr<TriangleMesh> ReadUnnamed(const Json& surface, const std::string& role) {
-    const std::string path = (folder_ / surface.at("file").get<std::string>()).string();
+    const std::string path = PathOf(surface.at("file"));
     TF_ASSIGN_OR_RETURN(const TriangleMeshFile file, ReadTriangleMesh(path));
     std::string& roles = of_space_[file.space];
     absl::StrAppend(&roles, roles.empty() ? "" : ", ", role);
@@ -137,10 +145,11 @@ class SurfacesReader {
     options.threads = threads_;
     TF_ASSIGN_OR_RETURN(WrappedSurface wrapped, WrapSurface(mesh, options));
     if (!wrapped.is_sheet) return std::move(wrapped.mesh);
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "the wrap at %g mm goes through an opening and encloses only a sheet; close the opening, or "
-        "give a \"wrap_mm\" of %.2g or more",
-        offset_mm, OffsetThatBridges(mesh) * 1.05));
+    return absl::InvalidArgumentError(
+        absl::StrFormat("the wrap at %g mm goes through an opening and encloses only a sheet; "
+                        "close the opening, or "
+                        "give a \"wrap_mm\" of %.2g or more",
+                        offset_mm, OffsetThatBridges(mesh) * 1.05));
   }
 
   static absl::StatusOr<TriangleMesh> Oriented(const TriangleMesh& mesh) {
@@ -179,6 +188,16 @@ class SurfacesReader {
   mutable std::map<FileSpace, std::string> of_space_;  // roles by what their files state
 };
 
+// Of its box: near the middle of the piece.
+Eigen::Vector3d MiddleOf(const TriangleMesh& mesh) { return BoxOf(mesh).center(); }
+
+absl::StatusOr<HandlePose> PoseFromTransform(const std::string& path, const TriangleMesh& piece) {
+  TF_ASSIGN_OR_RETURN(const std::string text,
+                      ReadJsonText(path, "transform file", kMaxTransformBytes));
+  TF_ASSIGN_OR_RETURN(const RigidMove move, ParseItkTransform(text));
+  return PoseOf(move, MiddleOf(piece));
+}
+
 // Whether the segments are surfaces, which is either all of them or none.
 absl::StatusOr<bool> SegmentsAreSurfaces(const Json& segments) {
   size_t with_surface = 0;
@@ -192,6 +211,14 @@ absl::StatusOr<bool> SegmentsAreSurfaces(const Json& segments) {
     if (segment.contains("surface") && segment.contains("planes")) {
       return absl::InvalidArgumentError(
           absl::StrCat("\"planes\" at ", where, " has no use beside \"surface\""));
+    }
+    if (segment.contains("moved") && !segment.contains("surface")) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("\"moved\" at ", where, " needs a \"surface\" that is fitted to it"));
+    }
+    if (segment.contains("pose") + segment.contains("transform") + segment.contains("moved") > 1) {
+      return absl::InvalidArgumentError(absl::StrCat("\"pose\", \"transform\" and \"moved\" at ",
+                                                     where, " exclude each other; give one"));
     }
     if (segment.contains("surface")) ++with_surface;
   }
@@ -208,9 +235,8 @@ Json TissueTable(const Json& json) {
   const Json inner = json.value("tissues", Json::array());
   Json table = Json::array();
   const auto add = [&](const std::string& name, double modulus_kpa) {
-    Json tissue = {{"name", name},
-                   {"youngs_modulus_pa", modulus_kpa * 1000},
-                   {"source", "the surfaces file"}};
+    Json tissue = {
+        {"name", name}, {"youngs_modulus_pa", modulus_kpa * 1000}, {"source", "the surfaces file"}};
     if (table.size() < inner.size()) tissue["hu_below"] = table.size() + 1;
     table.push_back(std::move(tissue));
   };
@@ -227,7 +253,7 @@ absl::StatusOr<Recipe> RecipeOf(const Json& json, const std::string& path) {
     if (json.contains(key)) recipe[key] = json.at(key);
   }
   for (Json segment : json.at("segments")) {
-    segment.erase("surface");
+    for (const char* key : {"surface", "transform", "moved"}) segment.erase(key);
     if (!segment.contains("osteotomy")) segment["osteotomy"] = "bssro";
     recipe["segments"].push_back(std::move(segment));
   }
@@ -247,6 +273,43 @@ absl::Status ReadSegmentSurfaces(const Json& segments, const Recipe& recipe, Sur
       TF_ASSIGN_OR_RETURN(segment.mesh, reader->Read(surface, role));
     }
     surfaces->segments.push_back(std::move(segment));
+  }
+  return absl::OkStatus();
+}
+
+// Replaces the poses of segments that give a transform or a moved surface, with a note on each.
+absl::Status ReadMoves(const Json& segments, const HeadSurfaces& surfaces, SurfacesReader* reader,
+                       Recipe* recipe, std::vector<std::string>* notes) {
+  for (size_t s = 0; s < segments.size(); ++s) {
+    RecipeSegment& segment = recipe->segments[s];
+    const std::string role = absl::StrCat("segment \"", segment.name, "\"");
+    const bool upper = segment.kind == OsteotomyKind::kLeFort1;
+    const TriangleMesh& piece = !surfaces.segments.empty() ? surfaces.segments[s].mesh
+                                : upper                    ? surfaces.skull
+                                                           : surfaces.lower_jaw;
+    if (segments[s].contains("transform")) {
+      absl::StatusOr<HandlePose> pose =
+          PoseFromTransform(reader->PathOf(segments[s].at("transform")), piece);
+      if (!pose.ok()) {
+        return absl::Status(pose.status().code(),
+                            absl::StrCat(role, ": ", pose.status().message()));
+      }
+      segment.pose = *pose;
+      notes->push_back(absl::StrCat("The middle of ", role, " ", MoveText(segment.pose),
+                                    ": the inverse of its transform file, which maps points from "
+                                    "after the movement to before it."));
+    } else if (segments[s].contains("moved")) {
+      TF_ASSIGN_OR_RETURN(const TriangleMesh moved,
+                          reader->Read(segments[s].at("moved"), "moved " + role));
+      absl::StatusOr<RigidFit> fit = FitRigidly(piece, moved);
+      if (!fit.ok()) {
+        return absl::Status(fit.status().code(), absl::StrCat(role, ": ", fit.status().message()));
+      }
+      segment.pose = PoseOf(fit->move, MiddleOf(piece));
+      notes->push_back(absl::StrFormat(
+          "The middle of %s %s: the rigid fit to its moved surface, which leaves %.2f mm RMS.",
+          role, MoveText(segment.pose), fit->rms_mm));
+    }
   }
   return absl::OkStatus();
 }
@@ -274,11 +337,14 @@ absl::StatusOr<SurfacesInput> ReadParsed(const Json& json, const std::string& pa
     TF_ASSIGN_OR_RETURN(TriangleMesh mesh, reader.Read(tissue.at("surface"), role));
     surfaces.tissues.push_back(std::move(mesh));
   }
+  std::vector<std::string> move_notes;
+  TF_RETURN_IF_ERROR(ReadMoves(json.at("segments"), surfaces, &reader, &recipe, &move_notes));
   CtProvenance provenance;
   provenance.format = "surfaces";
   provenance.num_files = reader.num_files() + 1;
   provenance.sha256 = Sha256Hex({json.dump(), reader.digests()});
   provenance.notes = reader.Notes();
+  provenance.notes.insert(provenance.notes.end(), move_notes.begin(), move_notes.end());
   return SurfacesInput{.surfaces = std::move(surfaces),
                        .recipe = std::move(recipe),
                        .provenance = std::move(provenance)};

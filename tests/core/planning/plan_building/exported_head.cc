@@ -48,9 +48,8 @@ absl::StatusOr<ExportedHead> ExportHead(const HuGrid& hu, const LabelGrid& parts
 }
 
 absl::Status WriteHead(const ExportedHead& head, const std::string& folder) {
-  for (const auto& [name, mesh] : {std::pair("skin", head.skin),
-                                   {"skull", head.skull},
-                                   {"lower_jaw", head.lower_jaw}}) {
+  for (const auto& [name, mesh] :
+       {std::pair("skin", head.skin), {"skull", head.skull}, {"lower_jaw", head.lower_jaw}}) {
     TF_RETURN_IF_ERROR(WriteTriangleMesh(folder + "/" + name + ".stl",
                                          {.mesh = mesh, .point_data = {}, .cell_data = {}}));
   }

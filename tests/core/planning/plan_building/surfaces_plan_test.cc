@@ -10,7 +10,9 @@
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 
+#include "core/mechanics/deformation/create_deformer.h"
 #include "core/mesh/io/triangle_mesh_io.h"
+#include "core/mesh/skin_region.h"
 #include "core/planning/plan_building/plan_builder.h"
 #include "core/planning/plan_building/solid_voxels.h"
 #include "core/planning/plan_building/surfaces_file.h"
@@ -48,19 +50,18 @@ class SurfacesPlanTest : public ::testing::Test {
               ::testing::UnitTest::GetInstance()->current_test_info()->name();
     std::filesystem::create_directories(folder_);
     ASSERT_THAT(WriteHead(*head_, folder_), IsOk());
-    json_ = {{"format", "tissueform-surfaces"},
-             {"version", 1},
-             {"units", "mm"},
-             {"coordinate_system", "LPS"},
-             {"skin", {{"file", "skin.stl"}}},
-             {"skull", {{"file", "skull.stl"}}},
-             {"lower_jaw", {{"file", "lower_jaw.stl"}}},
-             {"segments",
-              {{{"name", "jaw"},
-                {"surface", "lower_jaw"},
-                {"pose", {{"translation_mm", {0, 5, 0}}}}}}},
-             {"spacing_mm", 2.5},
-             {"mesh", {{"edge_mm", 6.5}, {"fine_edge_mm", 5}}}};
+    json_ = {
+        {"format", "tissueform-surfaces"},
+        {"version", 1},
+        {"units", "mm"},
+        {"coordinate_system", "LPS"},
+        {"skin", {{"file", "skin.stl"}}},
+        {"skull", {{"file", "skull.stl"}}},
+        {"lower_jaw", {{"file", "lower_jaw.stl"}}},
+        {"segments",
+         {{{"name", "jaw"}, {"surface", "lower_jaw"}, {"pose", {{"translation_mm", {0, 5, 0}}}}}}},
+        {"spacing_mm", 2.5},
+        {"mesh", {{"edge_mm", 6.5}, {"fine_edge_mm", 5}}}};
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
@@ -69,15 +70,19 @@ class SurfacesPlanTest : public ::testing::Test {
     return folder_ + "/surfaces.json";
   }
   void WriteSurface(const std::string& name, const TriangleMesh& mesh) const {
-    ASSERT_THAT(WriteTriangleMesh(folder_ + "/" + name,
-                                {.mesh = mesh, .point_data = {}, .cell_data = {}}), IsOk());
+    ASSERT_THAT(
+        WriteTriangleMesh(folder_ + "/" + name, {.mesh = mesh, .point_data = {}, .cell_data = {}}),
+        IsOk());
   }
   void TransformAll(const Eigen::Matrix3d& linear) const {
     ASSERT_THAT(WriteHead({Transformed(head_->skin, linear), Transformed(head_->skull, linear),
-                         Transformed(head_->lower_jaw, linear)},
-                        folder_), IsOk());
+                           Transformed(head_->lower_jaw, linear)},
+                          folder_),
+                IsOk());
   }
-  absl::StatusOr<PlanBuild> Build() const { return BuildPlanFromSurfaces(Write(), {.threads = 2, .tell = {}}); }
+  absl::StatusOr<PlanBuild> Build() const {
+    return BuildPlanFromSurfaces(Write(), {.threads = 2, .tell = {}});
+  }
   std::string Refusal() const {
     const absl::StatusOr<PlanBuild> build = Build();
     EXPECT_FALSE(build.ok());
@@ -92,6 +97,19 @@ class SurfacesPlanTest : public ::testing::Test {
 };
 ExportedHead* SurfacesPlanTest::head_ = nullptr;
 
+// Of the skin in a region, in mm.
+double MeanBackward(const PlanBuild& build, const Positions& moved, SkinRegion region) {
+  double sum_mm = 0;
+  int64_t count = 0;
+  for (size_t v = 0; v < build.regions.on_skin.size(); ++v) {
+    const bool is_in = build.regions.skin_region[v] == static_cast<uint8_t>(region);
+    if (!is_in || !build.regions.on_skin[v]) continue;
+    sum_mm += moved(static_cast<Eigen::Index>(v), 1);
+    ++count;
+  }
+  return sum_mm / static_cast<double>(count);
+}
+
 TEST_F(SurfacesPlanTest, PhantomBecomesAPlanWhoseSkinFollowsTheJaw) {
   absl::StatusOr<PlanBuild> build = Build();
   ASSERT_THAT(build.status(), IsOk());
@@ -105,6 +123,18 @@ TEST_F(SurfacesPlanTest, PhantomBecomesAPlanWhoseSkinFollowsTheJaw) {
   EXPECT_THAT(build->ct.notes, Contains(HasSubstr("The skin is open")));
   ASSERT_THAT(WritePlan(*build, folder_), IsOk());
   EXPECT_THAT(ReadPlan(folder_ + "/plan.json").status(), IsOk());
+
+  absl::StatusOr<PlanProblem> problem = ToPlanProblem(*build);
+  ASSERT_THAT(problem.status(), IsOk());
+  problem->deformer.model = DeformationModel::kLinearElastic;
+  const auto deformer =
+      CreateDeformer(*problem->mesh, problem->stiffness, problem->constraints, problem->deformer);
+  ASSERT_THAT(deformer.status(), IsOk());
+  const absl::StatusOr<Deformation> answer = (*deformer)->Deform(problem->poses);
+  ASSERT_THAT(answer.status(), IsOk());
+  const Positions moved = answer->positions - problem->mesh->positions();
+  EXPECT_GT(MeanBackward(*build, moved, SkinRegion::kChin), 3.5);
+  EXPECT_LT(MeanBackward(*build, moved, SkinRegion::kNose), 0.5);
 }
 
 TEST_F(SurfacesPlanTest, UnitsAndAxesDoNotChangeThePlan) {
@@ -146,8 +176,9 @@ TEST_F(SurfacesPlanTest, DamagedSurfacesGiveNearlyTheSamePlan) {
     return *TriangleMesh::Create(mesh.positions(), kept);
   };
   ASSERT_THAT(WriteHead({without_some(head_->skin), without_some(head_->skull),
-                       without_some(head_->lower_jaw)},
-                      folder_), IsOk());
+                         without_some(head_->lower_jaw)},
+                        folder_),
+              IsOk());
   const absl::StatusOr<PlanBuild> damaged = Build();
   ASSERT_THAT(damaged.status(), IsOk());
   EXPECT_NEAR(damaged->soft_tissue.volume_mm3 / plain->soft_tissue.volume_mm3, 1, 0.003);
@@ -181,18 +212,19 @@ TEST_F(SurfacesPlanTest, HeadCutByABoxGivesNearlyTheSameFace) {
 TEST_F(SurfacesPlanTest, TissueInsideASurfaceHasItsOwnStiffness) {
   // A box over the whole face in front of the chin's bone, and all below the palate.
   TriangleMesh box = Transformed(
-      *TriangleMesh::Create(
-          (Positions(8, 3) << 0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1)
-              .finished(),
-          (TriangleIndices(12, 3) << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3,
-           3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5)
-              .finished()),
+      *TriangleMesh::Create((Positions(8, 3) << 0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0,
+                             1, 0, 1, 1, 1, 1, 1)
+                                .finished(),
+                            (TriangleIndices(12, 3) << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4,
+                             1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5)
+                                .finished()),
       Eigen::Vector3d(200, 80, 100).asDiagonal());
   box = *TriangleMesh::Create(box.positions().rowwise() + Eigen::RowVector3d(-100, -120, -140),
                               box.triangles());
   WriteSurface("fat.ply", box);
   json_["young_modulus_kpa"] = 20;
-  json_["tissues"] = {{{"name", "fat"}, {"surface", {{"file", "fat.ply"}}}, {"young_modulus_kpa", 5}}};
+  json_["tissues"] = {
+      {{"name", "fat"}, {"surface", {{"file", "fat.ply"}}}, {"young_modulus_kpa", 5}}};
   const absl::StatusOr<PlanBuild> build = Build();
   ASSERT_THAT(build.status(), IsOk());
   double in_box = 0;
@@ -219,6 +251,35 @@ TEST_F(SurfacesPlanTest, TissueInsideASurfaceHasItsOwnStiffness) {
   EXPECT_NEAR(behind / static_cast<double>(num_behind), 20000, 1);
 }
 
+TEST_F(SurfacesPlanTest, MovementComesFromATransformOrAMovedSurface) {
+  Json& segment = json_["segments"][0];
+  segment.erase("pose");
+  std::ofstream(folder_ + "/jaw.tfm") << "#Insight Transform File V1.0\n#Transform 0\n"
+                                         "Transform: TranslationTransform_double_3_3\n"
+                                         "Parameters: 0 -5 1\nFixedParameters:\n";
+  segment["transform"] = "jaw.tfm";
+  const absl::StatusOr<SurfacesInput> by_file = ReadSurfaces(Write(), 1);
+  ASSERT_THAT(by_file.status(), IsOk());
+  EXPECT_EQ(by_file->recipe.segments[0].pose.translation_mm, Eigen::Vector3d(0, 5, -1));
+  EXPECT_THAT(by_file->provenance.notes, Contains(HasSubstr("moves 5.0 mm backward, 1.0 mm down")));
+
+  segment.erase("transform");
+  segment["moved"]["file"] = "after.stl";
+  Positions after = head_->lower_jaw.positions();
+  after.rowwise() += Eigen::RowVector3d(1, 6, 0);
+  WriteSurface("after.stl", *TriangleMesh::Create(after, head_->lower_jaw.triangles()));
+  const absl::StatusOr<SurfacesInput> by_fit = ReadSurfaces(Write(), 1);
+  ASSERT_THAT(by_fit.status(), IsOk());
+  EXPECT_LT((by_fit->recipe.segments[0].pose.translation_mm - Eigen::Vector3d(1, 6, 0)).norm(),
+            1e-3);
+  EXPECT_THAT(by_fit->provenance.notes, Contains(HasSubstr("mm RMS")));
+
+  segment["moved"]["file"] = "skull.stl";
+  EXPECT_THAT(Refusal(), HasSubstr("not the same piece"));
+  segment["transform"] = "jaw.tfm";
+  EXPECT_THAT(Refusal(), HasSubstr("exclude each other"));
+}
+
 struct BadSurfaces {
   const char* name;
   std::function<void(Json*)> change;
@@ -234,9 +295,15 @@ TEST_F(SurfacesPlanTest, RefusesWhatTheFileMustNotSay) {
       {"no file", [](Json* j) { (*j)["skin"]["file"] = "none.stl"; }, "skin"},
       {"segment", [](Json* j) { (*j)["segments"][0].erase("surface"); }, "no \"surface\""},
       {"mixed",
-       [](Json* j) { (*j)["segments"].push_back({{"name", "b"}, {"osteotomy", "bssro"}}); },
+       [](Json* j) {
+         (*j)["segments"].push_back({{"name", "b"}, {"osteotomy", "bssro"}});
+       },
        "give all as surfaces"},
-      {"far", [](Json* j) { (*j)["segments"][0]["pose"]["translation_mm"] = {0, 80, 0}; }, "80"},
+      {"far",
+       [](Json* j) {
+         (*j)["segments"][0]["pose"]["translation_mm"] = {0, 80, 0};
+       },
+       "80"},
       {"twice", [](Json* j) { (*j)["segments"].push_back((*j)["segments"][0]); }, "two segments"},
       {"in m", [](Json* j) { (*j)["units"] = "m"; }, "the skin is"},
       {"inside out", [](Json* j) { (*j)["skin"]["flip"] = true; }, "the skin is inside out"},
@@ -292,20 +359,19 @@ TEST(SurfacesOfBundledHeadTest, PredictsWhatThePlanOfTheCtPredicts) {
   const absl::StatusOr<ExportedHead> head = ExportHead(ct->head.hu, ct->parts.labels, 4);
   ASSERT_THAT(head.status(), IsOk());
   ASSERT_THAT(WriteHead(*head, folder), IsOk());
-  std::ofstream(folder + "/surfaces.json")
-      << Json{{"format", "tissueform-surfaces"},
-              {"version", 1},
-              {"units", "mm"},
-              {"coordinate_system", "LPS"},
-              {"skin", {{"file", "skin.stl"}}},
-              {"skull", {{"file", "skull.stl"}}},
-              {"lower_jaw", {{"file", "lower_jaw.stl"}}},
-              {"spacing_mm", 2},
-              {"segments",
-               {{{"name", "mandible"},
-                 {"osteotomy", "bssro"},
-                 {"pose", {{"translation_mm", {0, 6, 0}}}}}}}}
-             .dump();
+  std::ofstream(folder + "/surfaces.json") << Json{{"format", "tissueform-surfaces"},
+                                                   {"version", 1},
+                                                   {"units", "mm"},
+                                                   {"coordinate_system", "LPS"},
+                                                   {"skin", {{"file", "skin.stl"}}},
+                                                   {"skull", {{"file", "skull.stl"}}},
+                                                   {"lower_jaw", {{"file", "lower_jaw.stl"}}},
+                                                   {"spacing_mm", 2},
+                                                   {"segments",
+                                                    {{{"name", "mandible"},
+                                                      {"osteotomy", "bssro"},
+                                                      {"pose", {{"translation_mm", {0, 6, 0}}}}}}}}
+                                                  .dump();
   const absl::StatusOr<PlanBuild> surfaces =
       BuildPlanFromSurfaces(folder + "/surfaces.json", {.threads = 2, .tell = {}});
   ASSERT_THAT(surfaces.status(), IsOk());

@@ -29,7 +29,8 @@ constexpr int kThreads = 2;
 absl::Status Run(char** arguments) {
   const std::string folder = arguments[4];
   TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(arguments[2]));
-  TF_ASSIGN_OR_RETURN(const PlanBuild ct, BuildPlan(arguments[1], recipe, {.threads = kThreads, .tell = {}}));
+  TF_ASSIGN_OR_RETURN(const PlanBuild ct,
+                      BuildPlan(arguments[1], recipe, {.threads = kThreads, .tell = {}}));
   TF_ASSIGN_OR_RETURN(const ExportedHead head, ExportHead(ct.head.hu, ct.parts.labels, 4));
   TF_RETURN_IF_ERROR(WriteHead(head, folder));
   nlohmann::json json = nlohmann::json::parse(std::ifstream(arguments[3]));
@@ -37,14 +38,14 @@ absl::Status Run(char** arguments) {
     json[name] = {{"file", std::string(name) + ".stl"}};
   }
   std::ofstream(folder + "/surfaces.json") << json.dump(2);
-  TF_ASSIGN_OR_RETURN(const PlanBuild surfaces,
-                      BuildPlanFromSurfaces(folder + "/surfaces.json", {.threads = kThreads, .tell = {}}));
+  TF_ASSIGN_OR_RETURN(
+      const PlanBuild surfaces,
+      BuildPlanFromSurfaces(folder + "/surfaces.json", {.threads = kThreads, .tell = {}}));
   TF_ASSIGN_OR_RETURN(const PlanDifference difference,
                       ComparePlans(surfaces, ct, DeformationModel::kLinearElastic));
   std::printf("%s%s\nlargest difference of movement %.2f mm; segment volumes %.1f and %.1f cm3\n",
-              TableHead().c_str(), TableRow("surfaces", difference).c_str(),
-              difference.movement.mm, surfaces.segments[0].volume_mm3 / 1000,
-              ct.segments[0].volume_mm3 / 1000);
+              TableHead().c_str(), TableRow("surfaces", difference).c_str(), difference.movement.mm,
+              surfaces.segments[0].volume_mm3 / 1000, ct.segments[0].volume_mm3 / 1000);
   return absl::OkStatus();
 }
 
