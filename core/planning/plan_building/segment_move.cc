@@ -9,16 +9,15 @@
 #include <optional>
 #include <vector>
 
-#include <Eigen/Geometry>
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SVD>
 
 #include "core/base/status_macros.h"
 #include "core/mesh/generation/surface_distance.h"
@@ -54,7 +53,8 @@ absl::StatusOr<std::vector<double>> Numbers(absl::string_view text) {
 absl::StatusOr<ItkText> Split(const std::string& text) {
   if (!absl::StartsWith(text, "#Insight Transform File")) {
     return absl::InvalidArgumentError(
-        "the file is not a text file of ITK transforms: it does not begin with \"#Insight Transform "
+        "the file is not a text file of ITK transforms: it does not begin with \"#Insight "
+        "Transform "
         "File\"; save the transform as .tfm or .txt");
   }
   ItkText itk;
@@ -130,7 +130,8 @@ Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix) {
 RigidMove MoveOnto(const Positions& from, const Positions& to) {
   const Eigen::RowVector3d from_center = from.colwise().mean();
   const Eigen::RowVector3d to_center = to.colwise().mean();
-  const Eigen::Matrix3d spread = (to.rowwise() - to_center).transpose() * (from.rowwise() - from_center);
+  const Eigen::Matrix3d spread =
+      (to.rowwise() - to_center).transpose() * (from.rowwise() - from_center);
   RigidMove move;
   move.rotation = NearestRotation(spread);
   move.translation_mm = to_center.transpose() - move.rotation * from_center.transpose();
@@ -151,9 +152,8 @@ Positions Sample(const TriangleMesh& mesh) {
   Positions points(count, 3);
   for (Eigen::Index i = 0; i < count; ++i) {
     const auto t = mesh.triangles().row(i * mesh.num_triangles() / count);
-    points.row(i) = (mesh.positions().row(t[0]) + mesh.positions().row(t[1]) +
-                     mesh.positions().row(t[2])) /
-                    3;
+    points.row(i) =
+        (mesh.positions().row(t[0]) + mesh.positions().row(t[1]) + mesh.positions().row(t[2])) / 3;
   }
   return points;
 }
@@ -162,8 +162,7 @@ RigidFit FitByNearest(const TriangleMesh& from, const TriangleMesh& to) {
   const NearestPoints nearest(to);
   const Positions points = Sample(from);
   RigidFit fit;
-  fit.move.translation_mm =
-      (Sample(to).colwise().mean() - points.colwise().mean()).transpose();
+  fit.move.translation_mm = (Sample(to).colwise().mean() - points.colwise().mean()).transpose();
   fit.rms_mm = INFINITY;
   for (int round = 0; round < kMaxFitRounds; ++round) {
     const Positions targets = nearest.Of(Moved(points, fit.move));
@@ -183,8 +182,7 @@ absl::StatusOr<RigidMove> ParseItkTransform(const std::string& text) {
   const std::optional<Eigen::Matrix3d> matrix = MatrixOf(itk);
   if (!matrix || itk.parameters.size() < 3) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "the transform is not rigid or has the wrong number of parameters (",
-        itk.parameters.size(),
+        "the transform is not rigid or has the wrong number of parameters (", itk.parameters.size(),
         "); known are AffineTransform, MatrixOffsetTransformBase, Euler3DTransform, "
         "VersorRigid3DTransform and TranslationTransform in 3-D"));
   }
@@ -208,7 +206,8 @@ absl::StatusOr<RigidFit> FitRigidly(const TriangleMesh& from, const TriangleMesh
   }
   if (fit.rms_mm <= kLargestRmsMm) return fit;
   return absl::InvalidArgumentError(absl::StrFormat(
-      "the piece and its moved surface differ by %.1f mm RMS after the best rigid fit, more than %g "
+      "the piece and its moved surface differ by %.1f mm RMS after the best rigid fit, more than "
+      "%g "
       "mm: they are not the same piece, or one is in another place; give the pose as numbers",
       fit.rms_mm, kLargestRmsMm));
 }

@@ -21,6 +21,8 @@
 #include "core/base/json/json_schema.h"
 #include "core/base/json/json_text.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/border_loops.h"
+#include "core/mesh/generation/surface_distance.h"
 #include "core/mesh/generation/surface_wrapping.h"
 #include "core/mesh/io/triangle_mesh_io.h"
 #include "core/mesh/payload/sha256.h"
@@ -139,17 +141,16 @@ class SurfacesReader {
     return surface.contains("wrap_mm") ? Wrapped(mesh, surface.at("wrap_mm")) : Oriented(mesh);
   }
 
+  // Openings are closed first: the wrap would enter wide ones and enclose a sheet. Afterwards its
+  // vertices go back to the surface from the offset, by which bones would be too thick.
   absl::StatusOr<TriangleMesh> Wrapped(const TriangleMesh& mesh, double offset_mm) const {
     WrappingOptions options;
     options.offset_mm = offset_mm;
     options.threads = threads_;
-    TF_ASSIGN_OR_RETURN(WrappedSurface wrapped, WrapSurface(mesh, options));
-    if (!wrapped.is_sheet) return std::move(wrapped.mesh);
-    return absl::InvalidArgumentError(
-        absl::StrFormat("the wrap at %g mm goes through an opening and encloses only a sheet; "
-                        "close the opening, or "
-                        "give a \"wrap_mm\" of %.2g or more",
-                        offset_mm, OffsetThatBridges(mesh) * 1.05));
+    const TriangleMesh closed = WithOpeningsClosed(mesh, BorderLoops(mesh));
+    TF_ASSIGN_OR_RETURN(const WrappedSurface wrapped, WrapSurface(closed, options));
+    return TriangleMesh::Create(NearestPoints(closed).Of(wrapped.mesh.positions()),
+                                wrapped.mesh.triangles());
   }
 
   static absl::StatusOr<TriangleMesh> Oriented(const TriangleMesh& mesh) {

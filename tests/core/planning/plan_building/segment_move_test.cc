@@ -7,12 +7,10 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Geometry>
-
+#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-
-#include "absl/strings/str_cat.h"
+#include <Eigen/Geometry>
 
 #include "tests/testing/status_matchers.h"
 
@@ -47,7 +45,8 @@ TriangleMesh Egg(int rows) {
     }
   }
   Positions positions(static_cast<Eigen::Index>(points.size()), 3);
-  for (size_t v = 0; v < points.size(); ++v) positions.row(static_cast<Eigen::Index>(v)) = points[v];
+  for (size_t v = 0; v < points.size(); ++v)
+    positions.row(static_cast<Eigen::Index>(v)) = points[v];
   TriangleIndices triangles(static_cast<Eigen::Index>(faces.size()), 3);
   for (size_t f = 0; f < faces.size(); ++f) triangles.row(static_cast<Eigen::Index>(f)) = faces[f];
   return *TriangleMesh::Create(std::move(positions), std::move(triangles));
@@ -91,9 +90,8 @@ TEST(SegmentMoveTest, KindsOfOneRotationAboutACenterAgree) {
     ASSERT_THAT(move.status(), IsOk()) << text;
     const Eigen::Vector3d x(7, -3, 4);
     const Eigen::Vector3d center(10, 20, 30);
-    const Eigen::Vector3d y =
-        Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()) * (x - center) + center +
-        Eigen::Vector3d(1, 2, 3);
+    const Eigen::Vector3d y = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()) * (x - center) +
+                              center + Eigen::Vector3d(1, 2, 3);
     EXPECT_LT((move->rotation * y + move->translation_mm - x).norm(), 1e-4) << text;
   }
 }

@@ -209,6 +209,30 @@ TEST_F(SurfacesPlanTest, HeadCutByABoxGivesNearlyTheSameFace) {
   EXPECT_NEAR(cut->soft_tissue.volume_mm3 / plain->soft_tissue.volume_mm3, 1, 0.05);
 }
 
+// Skins without airway and sinuses, and a skull with a wide hole in its base: brain and face are
+// one piece of tissue, as deep in the face as in the brain.
+TEST_F(SurfacesPlanTest, SolidHeadKeepsItsFaceAndLosesItsBrain) {
+  const absl::StatusOr<PlanBuild> plain = Build();
+  ASSERT_THAT(plain.status(), IsOk());
+  LabelGrid parts = HeadPhantomParts();
+  ForEachVoxel(parts, [&](size_t index, const Eigen::Vector3d& place) {
+    const bool in_base =
+        std::abs(place.x()) < 25 && std::abs(place.z()) < 16 && place.y() > -60 && place.y() < 30;
+    if (in_base && parts.values[index] == kCranium) parts.values[index] = 0;
+  });
+  const LabelGrid solid = HeadPhantomMask();
+  HuGrid hu(solid.geometry, -1000);
+  ForEachVoxel(solid, [&](size_t index, const Eigen::Vector3d&) { hu.values[index] = 0; });
+  const absl::StatusOr<ExportedHead> head = ExportHead(hu, parts, 12);
+  ASSERT_THAT(head.status(), IsOk());
+  ASSERT_THAT(WriteHead(*head, folder_), IsOk());
+  json_["skin"]["wrap_mm"] = 2;  // also fills what is left of cavities
+  const absl::StatusOr<PlanBuild> build = Build();
+  ASSERT_THAT(build.status(), IsOk());
+  EXPECT_NEAR(build->soft_tissue.volume_mm3 / plain->soft_tissue.volume_mm3, 0.95, 0.12);
+  EXPECT_GT(build->soft_tissue.left_out_mm3, 10e3);
+}
+
 TEST_F(SurfacesPlanTest, TissueInsideASurfaceHasItsOwnStiffness) {
   // A box over the whole face in front of the chin's bone, and all below the palate.
   TriangleMesh box = Transformed(
