@@ -43,7 +43,7 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
                           OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
   }
   for (const std::string& note : build.ct.notes) {
-    absl::StrAppend(&made.text, "CT      ", note, "\n");
+    absl::StrAppend(&made.text, request.surfaces.empty() ? "CT      " : "input   ", note, "\n");
   }
   absl::StrAppendFormat(&made.text, "report  %s/report.html: %s\n", request.folder_name,
                         made.ready
@@ -62,9 +62,16 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
   return made;
 }
 
+absl::StatusOr<PlanBuild> BuildFromInput(const PlanBuildRequest& request,
+                                         const StageFunction& tell) {
+  const PlanBuildOptions options{.threads = request.threads, .tell = Within(tell, 0, kBuildShare)};
+  if (!request.surfaces.empty()) return BuildPlanFromSurfaces(request.surfaces, options);
+  TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(request.recipe));
+  return BuildPlan(request.ct, recipe, options);
+}
+
 absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& request,
                                                    const StageFunction& tell) {
-  TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(request.recipe));
   // As deform does: the last digits would depend on their number, and with them what the trial of
   // the planned move finds torn. Threads that wait for each other also cost more than they give.
   SetBlasThreads(1);
@@ -73,9 +80,7 @@ absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& reque
     // First, so that a missing program is told before the work.
     TF_ASSIGN_OR_RETURN(display, VirtualDisplay::Open());
   }
-  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildPlan(request.ct, recipe,
-                                                       {.threads = request.threads,
-                                                        .tell = Within(tell, 0, kBuildShare)}));
+  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildFromInput(request, tell));
   tell("writing the plan", kBuildShare);
   TF_RETURN_IF_ERROR(WritePlan(build, request.folder));
   TF_RETURN_IF_ERROR(WritePlanReport(build,

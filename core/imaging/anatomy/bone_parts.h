@@ -24,6 +24,7 @@ enum class JawSeparation {
   kThreshold,     // they do not touch: above `marker_hu` they are separate pieces
   kAutomaticCut,  // they touch: cut by the plane with the best clearance
   kGivenCut,      // cut by the plane of the caller
+  kGiven,         // the lower jaw was given apart from the skull
 };
 
 struct BoneParts {

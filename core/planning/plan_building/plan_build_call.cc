@@ -28,7 +28,7 @@ constexpr int64_t kFractionUnits = 1'000'000;
 
 void SendRequest(const PlanBuildRequest& request, PipeSender* to) {
   for (const std::string& text :
-       {request.ct, request.recipe, request.folder, request.folder_name}) {
+       {request.ct, request.recipe, request.surfaces, request.folder, request.folder_name}) {
     to->Text(text);
   }
   to->Number(request.threads);
@@ -37,7 +37,8 @@ void SendRequest(const PlanBuildRequest& request, PipeSender* to) {
 
 absl::StatusOr<PlanBuildRequest> ReceiveRequest(PipeReceiver* from) {
   PlanBuildRequest request;
-  for (std::string* text : {&request.ct, &request.recipe, &request.folder, &request.folder_name}) {
+  for (std::string* text :
+       {&request.ct, &request.recipe, &request.surfaces, &request.folder, &request.folder_name}) {
     TF_ASSIGN_OR_RETURN(*text, from->Text());
   }
   TF_ASSIGN_OR_RETURN(const int64_t threads, from->Number(kMaxThreads));

@@ -89,6 +89,13 @@ struct PlanBuildOptions {
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options = {});
 
+// The same from a surfaces file (surfaces_file.h), without a CT: the grids of the result are made
+// from the surfaces, and its recipe is what the file says besides.
+//
+// Errors: those of ReadSurfaces and MakeHeadFromSurfaces, and those of the later stages.
+absl::StatusOr<PlanBuild> BuildPlanFromSurfaces(const std::string& path,
+                                                const PlanBuildOptions& options = {});
+
 // Writes into the folder, which exists:
 //   plan.json           the plan (docs/plan-format.md)
 //   head.vtu            the mesh; point arrays anatomy, skin_region, contact where the lips are

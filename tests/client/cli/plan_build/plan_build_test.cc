@@ -216,6 +216,13 @@ TEST_F(PlanBuildTest, FolderThatCannotBeFilledIsRefusedBeforeTheWork) {
 TEST_F(PlanBuildTest, WrongUseIsOneLine) {
   EXPECT_THAT(Run({"plan", "build"}), FailsWith(2, HasSubstr("tissueform plan build --help")));
   EXPECT_THAT(Build({"--out", "head", "--threads", "many"}), FailsWith(2, HasSubstr("many")));
+  EXPECT_THAT(Run({"plan", "build", "--out", "head", "--surfaces", "a.json", "--ct", "b.nrrd",
+                   "--recipe", "recipe.json"}),
+              FailsWith(2, HasSubstr("--surfaces")));
+  EXPECT_THAT(Run({"plan", "build", "--out", "head", "--ct", "b.nrrd"}),
+              FailsWith(2, HasSubstr("--recipe")));
+  EXPECT_THAT(Run({"plan", "build", "--out", "head", "--no-pictures", "--surfaces", "a.json"}),
+              FailsWith(1, HasSubstr("a.json")));
   const ProcessResult help = Run({"plan", "build", "--help"});
   EXPECT_THAT(help, Succeeds());
   EXPECT_THAT(help.out, AllOf(HasSubstr("\"osteotomy\": \"bssro\""), HasSubstr("Examples")));
