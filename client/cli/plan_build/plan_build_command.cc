@@ -29,6 +29,7 @@ namespace {
 struct PlanBuildArguments {
   std::string ct;
   std::string recipe;
+  std::string labels;
   std::string out;
   std::string stats;
   int threads = 0;
@@ -81,6 +82,7 @@ absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& argume
   TF_ASSIGN_OR_RETURN(PlanBuildAnswer made,
                       CallPlanBuild({.ct = arguments.ct,
                                      .recipe = arguments.recipe,
+                                     .labels = arguments.labels,
                                      .folder = folder.path(),
                                      .folder_name = arguments.out,
                                      .threads = arguments.threads,
@@ -132,6 +134,7 @@ constexpr char kFooter[] =
     "Examples:\n"
     "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
     "  tissueform plan build --ct head.nrrd --recipe recipe.json --out head --no-pictures\n"
+    "  tissueform plan build --ct series/ --labels bones.seg.nrrd --recipe recipe.json --out head\n"
     "Exit codes: 0 done, 1 the work failed or the plan is not ready, 2 wrong use, 128 + signal "
     "when ended by one.";
 
@@ -148,6 +151,10 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
       ->required();
   build->add_option("--recipe", arguments->recipe, "the recipe (docs/recipe-format.md)")
       ->required();
+  build->add_option("--labels", arguments->labels,
+                    "label map of this CT (.seg.nrrd .nrrd .nii .nii.gz .mha or DICOM SEG); its "
+                    "bones, teeth and hollows take the place of what thresholds find "
+                    "(docs/bring-your-own.md)");
   build->add_option("--out", arguments->out, "folder for the plan: a new or an empty one")
       ->required();
   build

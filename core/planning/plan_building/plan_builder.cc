@@ -60,7 +60,8 @@ struct ResampledCt {
   CtProvenance provenance;
   std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
-  LabelGrid unscanned;  // core/imaging/ct/unscanned.h
+  std::string frame_uid;  // CtVolume::frame_uid
+  LabelGrid unscanned;    // core/imaging/ct/unscanned.h
   CtWithMetal ct;
 };
 
@@ -92,6 +93,7 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
   ResampledCt result{.provenance = std::move(volume.provenance),
                      .size = volume.size,
                      .spacing_mm = volume.spacing_mm,
+                     .frame_uid = volume.frame_uid,
                      .unscanned = {},
                      .ct = {}};
   TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
@@ -100,14 +102,31 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
   return result;
 }
 
-absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
-                                    const Recipe& recipe, Progress* progress) {
+struct HeadAndBone {
+  HeadSegmentation head;
+  absl::StatusOr<BoneParts> parts;  // an error where the jaws cannot be separated
+};
+
+// `labels` may be empty; gets the comparison with what the image alone shows.
+absl::StatusOr<HeadAndBone> SegmentBone(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                        const Recipe& recipe, std::optional<PlanLabels>* labels,
+                                        Progress* progress) {
   progress->Begin("finding head and bone", 0.12, 0.3);
   TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct.hu, recipe.segmentation,
                                                          progress->Parts(), ct.metal, unscanned));
   progress->Begin("separating bones", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
+  if (labels->has_value()) parts = SeparateByLabels(std::move(parts), &head, &**labels);
+  return HeadAndBone{std::move(head), std::move(parts)};
+}
+
+absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                    const Recipe& recipe, std::optional<PlanLabels>* labels,
+                                    Progress* progress) {
+  TF_ASSIGN_OR_RETURN(HeadAndBone bone, SegmentBone(ct, unscanned, recipe, labels, progress));
+  HeadSegmentation& head = bone.head;
+  absl::StatusOr<BoneParts>& parts = bone.parts;
   const bool plane_given = recipe.occlusal_plane.has_value();
   if (!parts.ok()) return ExplainMissingAnatomy(head, plane_given, parts.status());
   progress->Begin("finding landmarks", 0.42, 0.46);
@@ -276,12 +295,30 @@ std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
   return names;
 }
 
+absl::StatusOr<PlanLabels> CompareWithLabels(const std::string& ct_path, const Recipe& recipe,
+                                             const PlanBuildOptions& options) {
+  Progress progress(options.tell);
+  SetFilterThreads(options.threads);
+  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
+  TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
+                      ReadPlanLabels(recipe, ct.frame_uid, options.threads, &ct.ct.hu));
+  if (!labels) return absl::InvalidArgumentError("no label map is named; use --labels");
+  TF_ASSIGN_OR_RETURN(const HeadAndBone bone,
+                      SegmentBone(ct.ct, ct.unscanned, recipe, &labels, &progress));
+  TF_RETURN_IF_ERROR(bone.parts.status());
+  return *std::move(labels);
+}
+
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options) {
   Progress progress(options.tell);
   SetFilterThreads(options.threads);
   TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
-  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, &progress));
+  if (!recipe.labels.file.empty()) progress.Begin("reading the label map", 0.12, 0.12);
+  TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
+                      ReadPlanLabels(recipe, ct.frame_uid, options.threads, &ct.ct.hu));
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy,
+                      FindAnatomy(ct.ct, ct.unscanned, recipe, &labels, &progress));
   ct.unscanned = {};
   ct.ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
   TF_ASSIGN_OR_RETURN(DividedBone bone, CutBone(anatomy, recipe.segments, &progress));
@@ -338,6 +375,7 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .num_inverted = description.released.num_inverted,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage),
+                   .labels = std::move(labels),
                    .lips = std::move(lips),
                    .frankfort = anatomy.frankfort,
                    .head_frame = std::move(anatomy.frame),

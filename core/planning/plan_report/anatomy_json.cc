@@ -32,6 +32,8 @@ const char* SeparationText(JawSeparation separation) {
       return "the teeth do not touch: at marker_hu the mandible is a separate component";
     case JawSeparation::kAutomaticCut:
       return "the teeth touch: separated by the plane between them with the best clearance";
+    case JawSeparation::kLabels:
+      return "by the label map";
     case JawSeparation::kGivenCut:
       break;
   }

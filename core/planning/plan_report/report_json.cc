@@ -13,6 +13,7 @@
 #include "core/planning/plan_report/anatomy_json.h"
 #include "core/planning/plan_report/cautions.h"
 #include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/labels_report.h"
 #include "core/planning/plan_report/library_versions.h"
 #include "core/planning/plan_report/lips_report.h"
 #include "core/planning/plan_report/metal_report.h"
@@ -173,6 +174,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"program", ProgramJson(program_version)},
           {"input", InputJson(build)},
           {"metal", MetalJson(build)},
+          {"labels", LabelsJson(build.labels)},
           {"head", HeadJson(build)},
           {"bone", BoneJson(build, measures)},
           {"landmarks", LandmarksJson(build)},
