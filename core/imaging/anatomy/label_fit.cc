@@ -112,10 +112,9 @@ Best Search(const BoneSamples& samples, bool mirrored, const Eigen::Vector3i& mi
 std::string Hint(const LabelFit& fit) {
   if (fit.best_on_bone < fit.on_bone + kClearGain) return "";
   const std::string how =
-      fit.best_is_mirrored
-          ? "mirrored left to right"
-          : absl::StrFormat("moved by (%.0f, %.0f, %.0f) mm", fit.best_move_mm.x(),
-                            fit.best_move_mm.y(), fit.best_move_mm.z());
+      fit.best_is_mirrored ? "mirrored left to right"
+                           : absl::StrFormat("moved by (%.0f, %.0f, %.0f) mm", fit.best_move_mm.x(),
+                                             fit.best_move_mm.y(), fit.best_move_mm.z());
   return absl::StrFormat(" (hint: %.0f %% if it is %s)", 100 * fit.best_on_bone, how);
 }
 

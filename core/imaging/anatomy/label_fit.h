@@ -3,9 +3,8 @@
 
 #pragma once
 
-#include <Eigen/Core>
-
 #include "absl/status/statusor.h"
+#include <Eigen/Core>
 
 #include "core/imaging/ct/voxel_grid.h"
 #include "core/imaging/labels/label_resample.h"

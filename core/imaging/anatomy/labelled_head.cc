@@ -69,9 +69,8 @@ double MakeAir(const LabelGrid& mask, HuGrid* ct) {
 StructureAgreement Agreement(const std::string& name, const LabelGrid& labelled,
                              const LabelGrid& own, const LabelGrid& covered) {
   const LabelGrid own_covered = Both(own, covered);
-  StructureAgreement agreement{.name = name,
-                               .labelled_mm3 = VolumeMm3(labelled),
-                               .own_mm3 = VolumeMm3(own_covered)};
+  StructureAgreement agreement{
+      .name = name, .labelled_mm3 = VolumeMm3(labelled), .own_mm3 = VolumeMm3(own_covered)};
   const double sum = agreement.labelled_mm3 + agreement.own_mm3;
   if (sum > 0) agreement.dice = 2 * VolumeMm3(Both(labelled, own_covered)) / sum;
   return agreement;
@@ -133,8 +132,7 @@ LabelledGrid CropLabels(const LabelledGrid& labels, const GridGeometry& grid) {
 ClearedByLabels ClearByLabels(const LabelledGrid& labels, const HeadSegmentationOptions& options,
                               HuGrid* ct) {
   const double rim_mm = kRimVoxels * labels.voxel_mm;
-  const LabelGrid tissue =
-      MaskWhere(*ct, [&](int16_t hu) { return hu > options.tissue_above_hu; });
+  const LabelGrid tissue = MaskWhere(*ct, [&](int16_t hu) { return hu > options.tissue_above_hu; });
   ClearedByLabels cleared;
   if (HasAny(labels, kHollowSet)) {
     LabelGrid hollow = Both(Core(WhereAny(labels, kHollowSet), rim_mm), tissue);
@@ -160,8 +158,7 @@ LabelAgreement CompareLabels(const LabelledGrid& labels, const HeadSegmentation&
                  kMarrowMm);
   };
   const auto add = [&](const char* name, StructureSet set, const LabelGrid& image) {
-    agreement.structures.push_back(
-        Agreement(name, WhereAny(labels, set), image, labels.covered));
+    agreement.structures.push_back(Agreement(name, WhereAny(labels, set), image, labels.covered));
   };
   if (HasAny(labels, kLowerJawSet)) add("lower jaw with teeth", kLowerJawSet, own(kMandible));
   if (HasAny(labels, kUpperJawSet)) add("upper jaw and skull", kUpperJawSet, own(kCranium));
@@ -180,8 +177,7 @@ bool HasBothJaws(const LabelledGrid& labels) {
 void ApplyLabels(const LabelledGrid& labels, HeadSegmentation* head, BoneParts* parts) {
   const LabelGrid core = Core(WhereAny(labels, kBoneSet), kRimVoxels * labels.voxel_mm);
   const FloatGrid to_label = DistanceMm(WhereAny(labels, kBoneSet));
-  const bool whole_lower_jaw =
-      HasBothJaws(labels) && HasAny(labels, SetOf(Structure::kLowerTeeth));
+  const bool whole_lower_jaw = HasBothJaws(labels) && HasAny(labels, SetOf(Structure::kLowerTeeth));
   for (size_t i = 0; i < core.values.size(); ++i) {
     const StructureSet set = labels.structures.values[i] & kBoneSet;
     uint8_t& part = parts->labels.values[i];

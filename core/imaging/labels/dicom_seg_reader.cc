@@ -53,7 +53,7 @@ absl::Status Damaged() {
 
 // The pixels of all frames as they are stored.
 struct Pixels {
-  bool bits = false;    // eight a byte, without gaps between frames
+  bool bits = false;     // eight a byte, without gaps between frames
   bool numbers = false;  // of segments
   std::vector<float> values;
   absl::string_view bytes;
@@ -64,49 +64,75 @@ absl::Status CheckIsSeg(const gdcm::DataSet& data) {
   const std::string sop_class = TextOf(data, kSopClass);
   if (sop_class == kSegClass || sop_class == kLabelMapClass) return absl::OkStatus();
   const std::string modality = PrintableName(TextOf(data, kModality).substr(0, 4));
-  return absl::InvalidArgumentError(absl::StrCat(
-      "it is a DICOM file of modality ", modality.empty() ? "?" : modality,
-      ", not a segmentation (SEG); name the SEG file, and the CT with --ct"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("it is a DICOM file of modality ", modality.empty() ? "?" : modality,
+                   ", not a segmentation (SEG); name the SEG file, and the CT with --ct"));
 }
 
-// Without packing: what SEGs are stored with. GDCM decodes no packed bits.
-absl::StatusOr<Pixels> BitsOf(const gdcm::DataSet& data, size_t count) {
-  const gdcm::DataElement& element = data.GetDataElement(kPixelData);
-  const gdcm::ByteValue* const value = element.GetByteValue();
-  if (value == nullptr) {
-    return absl::InvalidArgumentError(
-        "the pixels of the binary SEG are compressed, which is not supported: export it "
-        "uncompressed");
+// A file that was read up to its pixels.
+struct SegFile {
+  const gdcm::DataSet& data;
+  const std::string& contents;
+  size_t pixel_offset = 0;
+  bool compressed = false;
+};
+
+absl::Status Compressed() {
+  return absl::InvalidArgumentError(
+      "the pixels of the SEG are compressed in a way that is not supported: export it "
+      "uncompressed");
+}
+
+// Little-endian, one after the other.
+absl::StatusOr<std::vector<float>> StoredValues(absl::string_view bytes, size_t count, int bits) {
+  const size_t width = bits == 16 ? 2 : 1;
+  if (bytes.size() < count * width) return Damaged();
+  std::vector<float> values(count);
+  for (size_t i = 0; i < count; ++i) {
+    const auto low = static_cast<uint8_t>(bytes[i * width]);
+    const auto high = width == 2 ? static_cast<uint8_t>(bytes[i * width + 1]) : uint8_t{0};
+    values[i] = static_cast<float>(low + 256 * high);
   }
-  Pixels pixels;
-  pixels.bits = true;
-  pixels.bytes = {value->GetPointer(), value->GetLength()};
-  if (pixels.bytes.size() < (count + 7) / 8) return Damaged();
-  return pixels;
+  return values;
 }
 
-absl::StatusOr<Pixels> PixelsOf(const gdcm::DataSet& data, const SegGrid& grid,
-                                const std::string& contents, int64_t max_voxels) {
-  if (!data.FindDataElement(kPixelData)) return Damaged();
-  const std::string type = TextOf(data, kSegmentationType);
-  const size_t count = static_cast<size_t>(grid.size[0]) * static_cast<size_t>(grid.size[1]) *
-                       grid.frames.size();
-  if (ShortOf(data, kBitsAllocated) == 1) return BitsOf(data, count);
-  if (count > static_cast<size_t>(max_voxels)) {
-    return absl::ResourceExhaustedError(absl::StrCat("its frames have ", count,
-                                                     " pixels; at most ", max_voxels, " are read"));
+absl::StatusOr<std::vector<float>> ValuesOf(const SegFile& file, const SegGrid& grid, size_t count,
+                                            int bits) {
+  if (!file.compressed) {
+    return StoredValues(absl::string_view(file.contents).substr(file.pixel_offset), count, bits);
   }
   DicomHeader header;
   header.rows = grid.size[1];
   header.columns = grid.size[0];
   header.num_frames = static_cast<int>(grid.frames.size());
-  absl::StatusOr<std::vector<float>> values = DecodeDicomPixels(header, contents);
-  if (!values.ok()) return Damaged();
+  header.pixel_offset = file.pixel_offset;
+  absl::StatusOr<std::vector<float>> values = DecodeDicomPixels(header, file.contents);
+  return values.ok() ? std::move(values) : Compressed();
+}
+
+absl::StatusOr<Pixels> PixelsOf(const SegFile& file, const SegGrid& grid, int64_t max_voxels) {
+  const std::string type = TextOf(file.data, kSegmentationType);
+  const int bits = ShortOf(file.data, kBitsAllocated);
+  const size_t count =
+      static_cast<size_t>(grid.size[0]) * static_cast<size_t>(grid.size[1]) * grid.frames.size();
   Pixels pixels;
-  pixels.values = *std::move(values);
+  if (bits == 1) {
+    // GDCM decodes no packed bits.
+    if (file.compressed) return Compressed();
+    pixels.bits = true;
+    pixels.bytes = absl::string_view(file.contents).substr(file.pixel_offset);
+    if (pixels.bytes.size() < (count + 7) / 8) return Damaged();
+    return pixels;
+  }
+  if (bits != 8 && bits != 16) return Damaged();
+  if (count > static_cast<size_t>(max_voxels)) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("its frames have ", count, " pixels; at most ", max_voxels, " are read"));
+  }
+  TF_ASSIGN_OR_RETURN(pixels.values, ValuesOf(file, grid, count, bits));
   pixels.numbers = type == "LABELMAP";
   if (type == "FRACTIONAL") {
-    const int most = ShortOf(data, kMaxFraction);
+    const int most = ShortOf(file.data, kMaxFraction);
     pixels.least = static_cast<float>(most > 0 ? most : 255) / 2;
   }
   return pixels;
@@ -167,11 +193,10 @@ absl::StatusOr<std::vector<LabelSegment>> TallySegments(const Pixels& pixels, co
   return segments;
 }
 
-absl::StatusOr<LabelMap> ToLabelMap(const gdcm::DataSet& data, const std::string& contents,
-                                    const LabelReadOptions& options) {
+absl::StatusOr<LabelMap> ToLabelMap(const SegFile& file, const LabelReadOptions& options) {
+  const gdcm::DataSet& data = file.data;
   TF_ASSIGN_OR_RETURN(const SegGrid grid, PlaceSegFrames(data, options.limits.max_voxels));
-  TF_ASSIGN_OR_RETURN(const Pixels pixels,
-                      PixelsOf(data, grid, contents, options.limits.max_voxels));
+  TF_ASSIGN_OR_RETURN(const Pixels pixels, PixelsOf(file, grid, options.limits.max_voxels));
   LabelMap map;
   map.size = grid.size;
   map.origin_mm = grid.origin_mm;
@@ -224,10 +249,20 @@ absl::StatusOr<LabelMap> ReadDicomSeg(const std::string& path, const LabelReadOp
   std::istringstream stream(contents);
   gdcm::Reader reader;
   reader.SetStream(stream);
-  if (!reader.Read()) return Damaged();
+  // A skipped tag is left unread: the stream stands where its value begins. GDCM itself passes over
+  // pixels that are missing at the end.
+  if (!reader.ReadUpToTag(kPixelData, {kPixelData})) return Damaged();
+  const gdcm::TransferSyntax& syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+  if (syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian ||
+      syntax == gdcm::TransferSyntax::ExplicitVRBigEndian) {
+    return Compressed();
+  }
   const gdcm::DataSet& data = reader.GetFile().GetDataSet();
   TF_RETURN_IF_ERROR(CheckIsSeg(data));
-  TF_ASSIGN_OR_RETURN(LabelMap map, ToLabelMap(data, contents, options));
+  const auto pixel_offset = static_cast<size_t>(reader.GetStreamCurrentPosition());
+  if (pixel_offset > contents.size()) return Damaged();
+  TF_ASSIGN_OR_RETURN(LabelMap map,
+                      ToLabelMap({data, contents, pixel_offset, syntax.IsEncapsulated()}, options));
   map.sha256 = Sha256Hex({contents});
   return map;
 }

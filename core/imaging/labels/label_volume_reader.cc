@@ -45,10 +45,11 @@ absl::Status CheckValues(const VolumeFileValues& file) {
   for (size_t i = 0; i < file.values.size(); ++i) {
     const float value = file.values[i];
     if (value >= 0 && value <= kMaxValue && value == std::floor(value)) continue;
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "it has the value %g, and labels are whole numbers from 0 to %d: it is an image or a map of "
-        "probabilities; export the label map",
-        static_cast<double>(value), kMaxValue));
+    return absl::InvalidArgumentError(
+        absl::StrFormat("it has the value %g, and labels are whole numbers from 0 to %d: it is an "
+                        "image or a map of "
+                        "probabilities; export the label map",
+                        static_cast<double>(value), kMaxValue));
   }
   return absl::OkStatus();
 }
@@ -126,9 +127,8 @@ absl::StatusOr<LabelMap> ToLabelMap(VolumeFileValues file, const FactsByLabel& f
     TF_RETURN_IF_ERROR(TallyLayer(file, layer, options.limits, &map.segments));
   }
   const std::vector<SegmentFacts> facts_of_segment = TakeFacts(facts, &map.segments);
-  TF_RETURN_IF_ERROR(AssignStructures(options, facts_of_segment,
-                                      std::abs(map.steps_mm.determinant()), &map.segments,
-                                      &map.notes));
+  TF_RETURN_IF_ERROR(AssignStructures(
+      options, facts_of_segment, std::abs(map.steps_mm.determinant()), &map.segments, &map.notes));
   TakeStructures(file, &map);
   return map;
 }
@@ -151,19 +151,19 @@ absl::StatusOr<LabelMap> ReadLabelVolume(const std::string& path, VolumeFormat f
     TF_ASSIGN_OR_RETURN(facts, ReadNiftiTable(path, options.limits.max_file_bytes));
   }
   absl::StatusOr<LabelMap> map = absl::InternalError("not read");
-  TF_RETURN_IF_ERROR(ReadVolumeFileValues(
-      path, format,
-      {.max_components = kMaxLayers,
-       .least_voxels = 1,
-       .axes = options.axes,
-       .spare_axes = true,
-       .max_file_bytes = options.limits.max_file_bytes,
-       .max_voxels = options.limits.max_voxels},
-      [&](VolumeFileValues file) {
-        if (format == VolumeFormat::kNrrd) facts = FactsOfNrrd(file.texts);
-        map = ToLabelMap(std::move(file), facts, options);
-        return map.status();
-      }));
+  TF_RETURN_IF_ERROR(ReadVolumeFileValues(path, format,
+                                          {.max_components = kMaxLayers,
+                                           .least_voxels = 1,
+                                           .axes = options.axes,
+                                           .spare_axes = true,
+                                           .max_file_bytes = options.limits.max_file_bytes,
+                                           .max_voxels = options.limits.max_voxels},
+                                          [&](VolumeFileValues file) {
+                                            if (format == VolumeFormat::kNrrd)
+                                              facts = FactsOfNrrd(file.texts);
+                                            map = ToLabelMap(std::move(file), facts, options);
+                                            return map.status();
+                                          }));
   return map;
 }
 

@@ -72,8 +72,8 @@ absl::Status CheckGroups(const Groups& groups, bool needs_segment, int frame) {
                               : needs_segment && groups.segment == 0 ? "segment"
                                                                      : nullptr;
   if (missing == nullptr) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("frame ", frame + 1, " of the SEG has no ", missing,
-                                                 "; export it again"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("frame ", frame + 1, " of the SEG has no ", missing, "; export it again"));
 }
 
 absl::Status NotOneVolume(absl::string_view why) {
@@ -127,10 +127,9 @@ absl::Status ArrangeSegFrames(const Eigen::Vector3d& row_direction,
       grid->frames, {}, [&](const SegFrame& frame) { return frame.position_mm.dot(normal); });
   grid->origin_mm = lowest->position_mm;
   // Sheared where a gantry was tilted.
-  const Eigen::Vector3d along = slices > 1 ? Eigen::Vector3d((highest->position_mm -
-                                                              lowest->position_mm) /
-                                                             (slices - 1))
-                                           : Eigen::Vector3d(step * normal);
+  const Eigen::Vector3d along =
+      slices > 1 ? Eigen::Vector3d((highest->position_mm - lowest->position_mm) / (slices - 1))
+                 : Eigen::Vector3d(step * normal);
   // DICOM's pixel spacing is that of rows first: along a column.
   grid->steps_mm << pixel_spacing_mm[1] * row_direction, pixel_spacing_mm[0] * column_direction,
       along;

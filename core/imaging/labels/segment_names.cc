@@ -68,8 +68,7 @@ bool SameName(absl::string_view a, absl::string_view b) {
 }
 
 // A rule that meets nothing is a slip: the plan would silently lack what the user has stated.
-absl::Status ApplyRules(const std::vector<LabelRule>& rules,
-                        const std::vector<SegmentFacts>& facts,
+absl::Status ApplyRules(const std::vector<LabelRule>& rules, const std::vector<SegmentFacts>& facts,
                         std::vector<LabelSegment>* segments) {
   for (const LabelRule& rule : rules) {
     bool met = false;
@@ -185,7 +184,8 @@ absl::Status ApplyNumbers(const std::string& stated, double voxel_mm3,
 absl::Status CheckSides(const std::vector<LabelSegment>& segments) {
   for (const LabelSegment& left : segments) {
     for (const LabelSegment& right : segments) {
-      if (left.side != Side::kLeft || right.side != Side::kRight || left.structure != right.structure)
+      if (left.side != Side::kLeft || right.side != Side::kRight ||
+          left.structure != right.structure)
         continue;
       if (left.middle_mm.x() > right.middle_mm.x()) continue;
       return absl::InvalidArgumentError(absl::StrFormat(
@@ -203,8 +203,8 @@ void NoteIgnored(const std::vector<LabelSegment>& segments, std::vector<std::str
     if (!segment.structure) ignored.push_back(&segment);
   }
   if (ignored.empty()) return;
-  notes->push_back(absl::StrCat("The label map has segments that are not known and not used: ",
-                                NamesOf(ignored), "."));
+  notes->push_back(absl::StrCat(
+      "The label map has segments that are not known and not used: ", NamesOf(ignored), "."));
 }
 
 absl::Status CheckKnown(const std::vector<LabelSegment>& segments) {
@@ -213,10 +213,9 @@ absl::Status CheckKnown(const std::vector<LabelSegment>& segments) {
     if (segment.structure) return absl::OkStatus();
     all.push_back(&segment);
   }
-  return absl::InvalidArgumentError(
-      absl::StrCat("none of its ", segments.size(), " segments is known: ", NamesOf(all),
-                   "; state what they are at \"labels/names\" in the recipe (", StructureKeys(),
-                   ")"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "none of its ", segments.size(), " segments is known: ", NamesOf(all),
+      "; state what they are at \"labels/names\" in the recipe (", StructureKeys(), ")"));
 }
 
 }  // namespace
@@ -242,8 +241,8 @@ absl::Status AssignStructures(const LabelReadOptions& options,
   ApplyFacts(facts, segments);
   const bool has_names =
       std::ranges::any_of(facts, [](const SegmentFacts& f) { return !f.name.empty(); });
-  const bool none_known =
-      std::ranges::none_of(*segments, [](const LabelSegment& s) { return s.structure.has_value(); });
+  const bool none_known = std::ranges::none_of(
+      *segments, [](const LabelSegment& s) { return s.structure.has_value(); });
   if (!options.convention.empty() || (!has_names && none_known)) {
     TF_RETURN_IF_ERROR(ApplyNumbers(options.convention, voxel_mm3, segments, notes));
   }

@@ -35,7 +35,6 @@ std::string PrintableName(absl::string_view name);
 // conventions, a rule of the recipe meets no segment, or left and right are swapped.
 absl::Status AssignStructures(const LabelReadOptions& options,
                               const std::vector<SegmentFacts>& facts, double voxel_mm3,
-                              std::vector<LabelSegment>* segments,
-                              std::vector<std::string>* notes);
+                              std::vector<LabelSegment>* segments, std::vector<std::string>* notes);
 
 }  // namespace tissueform

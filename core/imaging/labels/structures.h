@@ -35,8 +35,7 @@ inline constexpr StructureSet kLowerJawSet =
     SetOf(Structure::kLowerJaw) | SetOf(Structure::kLowerTeeth) | SetOf(Structure::kCanal);
 inline constexpr StructureSet kUpperJawSet =
     SetOf(Structure::kSkull) | SetOf(Structure::kUpperTeeth);
-inline constexpr StructureSet kBoneSet =
-    kLowerJawSet | kUpperJawSet | SetOf(Structure::kNeckBones);
+inline constexpr StructureSet kBoneSet = kLowerJawSet | kUpperJawSet | SetOf(Structure::kNeckBones);
 inline constexpr StructureSet kHollowSet =
     SetOf(Structure::kSinus) | SetOf(Structure::kAirway) | SetOf(Structure::kTube);
 

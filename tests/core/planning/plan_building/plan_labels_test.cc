@@ -78,8 +78,8 @@ std::string WriteNrrd(const std::string& name, const LabelGrid& labels, const Pl
   stream << "NRRD0004\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: "
          << grid.size[0] << " " << grid.size[1] << " " << grid.size[2] << "\nspace directions: ("
          << (place.mirror ? -grid.spacing_mm : grid.spacing_mm) << ",0,0) (0," << grid.spacing_mm
-         << ",0) (0,0," << grid.spacing_mm << ")\nspace origin: (" << x << ","
-         << grid.origin_mm.y() << "," << grid.origin_mm.z() << ")\nencoding: raw\nendian: little\n\n";
+         << ",0) (0,0," << grid.spacing_mm << ")\nspace origin: (" << x << "," << grid.origin_mm.y()
+         << "," << grid.origin_mm.z() << ")\nencoding: raw\nendian: little\n\n";
   stream.write(reinterpret_cast<const char*>(labels.values.data()),
                static_cast<std::streamsize>(labels.values.size()));
   return path;
@@ -138,8 +138,7 @@ class PlanLabelsTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     SetBlasThreads(1);
-    absl::StatusOr<PlanBuild> build =
-        BuildPlan(BundledCt(), RecipeOfHead(), {kThreads, nullptr});
+    absl::StatusOr<PlanBuild> build = BuildPlan(BundledCt(), RecipeOfHead(), {kThreads, nullptr});
     ASSERT_TRUE(build.ok()) << build.status();
     named = std::make_unique<LabelGrid>(NamedLabels(*build));
     truth = std::make_unique<PlanBuild>(*std::move(build));
@@ -267,8 +266,8 @@ TEST_F(PlanLabelsTest, LabelsOfARealHeadPredictTheSameFaceAndFitNoOtherHead) {
                        ComparePlans(build, by_thresholds, DeformationModel::kLinearElastic));
   EXPECT_LE(difference.movement_mean_mm, 0.2) << TableRow("vhm", difference);
 
-  EXPECT_THAT(Outcome(labels), StatusIs(absl::StatusCode::kInvalidArgument,
-                                        HasSubstr("does not overlap the CT")));
+  EXPECT_THAT(Outcome(labels),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not overlap the CT")));
   // With the chins in one place, as a frame of the scanner's table may have them.
   LabelGrid moved = NamedLabels(by_thresholds);
   moved.geometry.origin_mm += truth->landmarks.menton - by_thresholds.landmarks.menton;
