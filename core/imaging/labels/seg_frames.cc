@@ -37,6 +37,8 @@ constexpr uint32_t kSegmentationType = 0x00620001;
 constexpr double kSamePlaceMm = 0.02;
 constexpr double kOffStepShare = 0.1;  // of a step, that a slice may lie beside its place
 constexpr int kMaxSlices = 20000;
+constexpr double kFarthestMm = 1e5;  // of a frame from the origin
+constexpr double kMaxSpacingMm = 100;
 
 // What the functional groups of a frame, or the shared ones, say.
 struct Groups {
@@ -115,14 +117,23 @@ absl::Status ArrangeSegFrames(const Eigen::Vector3d& row_direction,
   const bool is_square = std::abs(row_direction.norm() - 1) < 1e-2 &&
                          std::abs(column_direction.norm() - 1) < 1e-2 &&
                          std::abs(normal.norm() - 1) < 1e-2;
-  if (!is_square || !(pixel_spacing_mm.minCoeff() > 0)) {
-    return NotOneVolume("rows and columns are not square to each other, or have no spacing");
+  if (!is_square) return NotOneVolume("rows and columns are not square to each other");
+  if (!(pixel_spacing_mm.minCoeff() > 0 && pixel_spacing_mm.maxCoeff() <= kMaxSpacingMm)) {
+    return NotOneVolume(
+        absl::StrCat("pixels have no spacing, or more than ", kMaxSpacingMm, " mm"));
+  }
+  for (const SegFrame& frame : grid->frames) {
+    if (!(frame.position_mm.cwiseAbs().maxCoeff() <= kFarthestMm)) {
+      return NotOneVolume("a frame is farther than 100 m from the origin");
+    }
   }
   const std::vector<double> heights = HeightsOf(grid->frames, normal);
   const double step = StepOf(heights, step_mm);
-  if (!(step > kSamePlaceMm)) return NotOneVolume("it has one slice of no stated thickness");
+  if (!(step > kSamePlaceMm && step <= kMaxSpacingMm)) {
+    return NotOneVolume("slices have no distance between them, or more than 100 mm");
+  }
   const double slices = std::round((heights.back() - heights.front()) / step) + 1;
-  if (slices > kMaxSlices) return NotOneVolume("its slices are too far apart");
+  if (!(slices <= kMaxSlices)) return NotOneVolume("its slices are too far apart");
   const auto [lowest, highest] = std::ranges::minmax_element(
       grid->frames, {}, [&](const SegFrame& frame) { return frame.position_mm.dot(normal); });
   grid->origin_mm = lowest->position_mm;

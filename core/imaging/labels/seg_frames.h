@@ -41,7 +41,7 @@ struct SegGrid {
 absl::StatusOr<SegGrid> PlaceSegFrames(const gdcm::DataSet& data, int64_t max_voxels);
 
 // What arranges the frames; the last step of PlaceSegFrames, without DICOM. `step_mm` is the
-// distance of slices that the file states, 0 where it does not.
+// distance of slices that the file states, 0 where it does not. REQUIRES: there are frames.
 absl::Status ArrangeSegFrames(const Eigen::Vector3d& row_direction,
                               const Eigen::Vector3d& column_direction,
                               const Eigen::Vector2d& pixel_spacing_mm, double step_mm,

@@ -213,7 +213,8 @@ TEST_F(LabelReaderTest, SaysWhatIsWrongInOneLine) {
   EXPECT_THAT(message("probability.nii"), HasSubstr("labels are whole numbers"));
   EXPECT_THAT(message("negative.nii"), HasSubstr("it has the value -1024"));
   EXPECT_THAT(message("empty.nii"), HasSubstr("no voxel of it is labelled"));
-  EXPECT_THAT(message("unknown.nii"), HasSubstr("none of its 3 segments is known: 9 (c), 40 (b), 71 "));
+  EXPECT_THAT(message("unknown.nii"),
+              HasSubstr("none of its 3 segments is known: 9 (c), 40 (b), 71 "));
   EXPECT_THAT(message("swapped.seg.nrrd"), HasSubstr("left and right are swapped"));
   EXPECT_THAT(message("ct.dcm"), HasSubstr("of modality CT, not a segmentation"));
 }
