@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
@@ -220,6 +222,27 @@ absl::Status Outcome(const std::string& labels) {
   Recipe recipe = RecipeOfHead();
   recipe.labels.file = labels;
   return CompareWithLabels(BundledCt(), recipe).status();
+}
+
+// The SEG of tests/core/imaging/labels/write_labels.py has a frame of reference that is not the
+// CT's; that of the same frame is judged by its place.
+TEST_F(PlanLabelsTest, RefusesASegOfAnotherImage) {
+  const std::string folder = absl::StrCat(::testing::TempDir(), "/segs");
+  std::filesystem::create_directories(folder);
+  const std::string command =
+      absl::StrCat("/usr/bin/python3 ", SourcePath("tests/core/imaging/labels/write_labels.py"),
+                   " ", folder, " 2> ", folder, "/errors.txt");
+  if (std::system(command.c_str()) != 0) GTEST_SKIP() << "pydicom, nibabel, VTK or unu is missing";
+  Recipe recipe = RecipeOfHead();
+  recipe.labels.file = folder + "/binary.dcm";
+  HuGrid ct = truth->head.hu;
+  EXPECT_THAT(ReadPlanLabels(recipe, "1.2.3", 1, &ct).status(),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("its frame of reference is not the CT's")));
+  for (const char* const frame_uid : {"1.2.826.0.1.3680043.8.498.1", ""}) {
+    EXPECT_THAT(ReadPlanLabels(recipe, frame_uid, 1, &ct).status(),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("does not overlap")));
+  }
 }
 
 TEST_F(PlanLabelsTest, RefusesAShiftedMapAndNamesTheShift) {
