@@ -65,7 +65,8 @@ absl::StatusOr<RecipeLabels> ToLabels(const Json& json) {
   RecipeLabels labels;
   labels.file = json.value("file", "");
   labels.convention = json.value("convention", "");
-  for (const auto& [key, names] : json.value("names", Json::object()).items()) {
+  const Json all_names = json.value("names", Json::object());
+  for (const auto& [key, names] : all_names.items()) {
     const std::optional<Structure> structure = StructureOfKey(key);
     if (!structure) {
       return absl::InvalidArgumentError(

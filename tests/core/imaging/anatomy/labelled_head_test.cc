@@ -20,9 +20,8 @@ constexpr int16_t kBoneHu = 1000;
 constexpr int16_t kAirHu = -1000;
 
 LabelledGrid NoLabels() {
-  return {.structures = VoxelGrid<StructureSet>(kGrid),
-          .covered = LabelGrid(kGrid, 1),
-          .voxel_mm = 1};
+  return {
+      .structures = VoxelGrid<StructureSet>(kGrid), .covered = LabelGrid(kGrid, 1), .voxel_mm = 1};
 }
 
 void Fill(int first, int last, StructureSet set, LabelledGrid* labels) {

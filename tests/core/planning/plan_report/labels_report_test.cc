@@ -34,9 +34,8 @@ PlanLabels SomeLabels() {
 
 TEST(LabelsReportTest, HasTheDiceCoefficientsAndOnlyKnownSegments) {
   const PlanLabels labels = SomeLabels();
-  EXPECT_THAT(LabelsText(labels),
-              AllOf(HasSubstr("lower jaw with teeth: Dice 0.950"), HasSubstr("90 % of the"),
-                    HasSubstr("A note.")));
+  EXPECT_THAT(LabelsText(labels), AllOf(HasSubstr("lower jaw with teeth: Dice 0.950"),
+                                        HasSubstr("90 % of the"), HasSubstr("A note.")));
   const nlohmann::ordered_json json = LabelsJson(labels);
   EXPECT_EQ(json["agreement"][0]["dice"], 0.95);
   ASSERT_EQ(json["segments"].size(), 1U);
