@@ -16,13 +16,12 @@
 namespace tissueform {
 namespace {
 
-constexpr int kMaxSamples = 4;  // along an axis of a voxel
-
 // Places of the samples in a voxel of the grid, in mm from its centre.
 std::vector<Eigen::Vector3d> SamplesOf(double voxel_mm, const Eigen::Vector3d& map_spacing_mm) {
-  // Rounding of spacings must not make a grid "finer" than its equal.
+  // Rounding of spacings must not make a grid "finer" than its equal. Odd numbers: a tie at one
+  // half would make all structures larger.
   const double ratio = voxel_mm / map_spacing_mm.minCoeff() - 1e-3;
-  const int count = std::clamp(static_cast<int>(std::ceil(ratio)), 1, kMaxSamples);
+  const int count = ratio <= 1 ? 1 : ratio <= 3 ? 3 : 5;
   const auto place = [&](int i) { return voxel_mm * ((i + 0.5) / count - 0.5); };
   std::vector<Eigen::Vector3d> samples;
   for (int z = 0; z < count; ++z) {
@@ -57,7 +56,7 @@ class Sampler {
     return to_map_ * (place_mm - map_.origin_mm);
   }
 
-  // What fills at least half of a voxel about `index`.
+  // What fills more than half of a voxel about `index`.
   StructureSet Filling(const Eigen::Vector3d& index) const {
     if (samples_.size() == 1) return At(index).value_or(0);
     std::array<size_t, kNumStructures> counts{};
@@ -68,7 +67,7 @@ class Sampler {
     }
     StructureSet filling = 0;
     for (size_t s = 0; s < counts.size(); ++s) {
-      if (2 * counts[s] >= samples_.size()) filling |= SetOf(static_cast<Structure>(s));
+      if (2 * counts[s] > samples_.size()) filling |= SetOf(static_cast<Structure>(s));
     }
     return filling;
   }

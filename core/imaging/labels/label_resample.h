@@ -17,8 +17,8 @@ struct LabelledGrid {
 };
 
 // A voxel gets the labels of the nearest voxel of the map. Where the map is finer, it gets each
-// structure that fills at least half of it, by up to 4 x 4 x 4 samples, so that partial volumes
-// are not lost. The result does not depend on the number of threads.
+// structure that fills more than half of it, by 3 x 3 x 3 or 5 x 5 x 5 samples, so that partial
+// volumes are not lost. The result does not depend on the number of threads.
 LabelledGrid ResampleLabels(const LabelMap& map, const GridGeometry& grid, int threads);
 
 }  // namespace tissueform

@@ -34,8 +34,8 @@ TEST(LabelResampleTest, TakesTheNearestVoxelOfACoarserMap) {
   EXPECT_EQ(labels.voxel_mm, 3);
 }
 
-// A wall in 2 of 4 voxels of the map fills half of a voxel of the grid; one in 1 does not, although
-// the nearest voxel is in it.
+// A wall in 2 of 4 voxels of the map is in 3 of 5 samples of a voxel of the grid; one in 1 of 4 is
+// in 1 of 5.
 TEST(LabelResampleTest, KeepsPartialVolumesOfAFinerMap) {
   LabelMap map = MapOf(8, 0.5);
   for (int k = 0; k < 8; ++k) {
