@@ -163,7 +163,7 @@ LabelAgreement CompareLabels(const LabelledGrid& labels, const HeadSegmentation&
   if (HasAny(labels, kLowerJawSet)) add("lower jaw with teeth", kLowerJawSet, own(kMandible));
   if (HasAny(labels, kUpperJawSet)) add("upper jaw and skull", kUpperJawSet, own(kCranium));
   if (HasAny(labels, SetOf(Structure::kHead))) {
-    const auto all = static_cast<StructureSet>(SetOf(Structure::kHead) | kBoneSet);
+    const auto all = static_cast<StructureSet>(~kHollowSet);
     add("head", all, head.head);
   }
   CompareVoxels(labels, parts, &agreement);

@@ -16,8 +16,8 @@ namespace tissueform {
 namespace {
 
 constexpr std::array<absl::string_view, kNumStructures> kKeys = {
-    "mandible", "skull", "upper_teeth", "lower_teeth", "canal",
-    "sinus",    "head",  "airway",      "tube",        "spine"};
+    "mandible", "skull",  "upper_teeth", "lower_teeth", "canal",  "sinus",
+    "head",     "airway", "tube",        "spine",       "muscle", "fat"};
 
 using Name = std::pair<absl::string_view, Structure>;
 
@@ -74,6 +74,14 @@ constexpr std::array kNames = {
     Name("vertebrae", Structure::kNeckBones),
     Name("hyoid", Structure::kNeckBones),
     Name("hyoid bone", Structure::kNeckBones),
+    Name("muscle", Structure::kMuscle),
+    Name("muscles", Structure::kMuscle),
+    Name("skeletal muscle", Structure::kMuscle),
+    Name("masseter", Structure::kMuscle),
+    Name("fat", Structure::kFat),
+    Name("subcutaneous fat", Structure::kFat),
+    Name("torso fat", Structure::kFat),
+    Name("adipose tissue", Structure::kFat),
     Name("vertebrae c1", Structure::kNeckBones),
     Name("vertebrae c2", Structure::kNeckBones),
     Name("vertebrae c3", Structure::kNeckBones),

@@ -23,8 +23,10 @@ enum class Structure : uint8_t {
   kAirway,
   kTube,
   kNeckBones,  // with the hyoid bone
+  kMuscle,
+  kFat,
 };
-inline constexpr int kNumStructures = 10;
+inline constexpr int kNumStructures = 12;
 
 // Sets of structures, a bit each.
 using StructureSet = uint16_t;

@@ -71,6 +71,7 @@ struct Anatomy {
   Landmarks landmarks;
   std::optional<FrankfortLandmarks> frankfort;
   HeadFrame frame;
+  LabelGrid known_tissue;  // PlanLabels::tissue
 };
 
 struct DividedBone {
@@ -117,7 +118,8 @@ absl::StatusOr<HeadAndBone> SegmentBone(const CtWithMetal& ct, const LabelGrid& 
   progress->Begin("separating bones", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
-  if (labels->has_value()) parts = SeparateByLabels(std::move(parts), &head, &**labels);
+  if (labels->has_value())
+    parts = SeparateByLabels(std::move(parts), recipe.tissues, &head, &**labels);
   return HeadAndBone{std::move(head), std::move(parts)};
 }
 
@@ -144,7 +146,8 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unsc
                  .parts = *std::move(parts),
                  .landmarks = *landmarks,
                  .frankfort = frankfort,
-                 .frame = std::move(frame)};
+                 .frame = std::move(frame),
+                 .known_tissue = labels->has_value() ? std::move((*labels)->tissue) : LabelGrid()};
 }
 
 absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {
@@ -260,8 +263,10 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
                                      const Recipe& recipe, int threads, Progress* progress) {
   progress->Begin("assigning stiffness and regions", 0.9, 0.96);
   const HeadSegmentation& head = anatomy.head;
-  TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
-                                                                  {.table = recipe.tissues}));
+  TF_ASSIGN_OR_RETURN(
+      TetStiffness stiffness,
+      ComputeTetStiffness(built.mesh, head.hu, head.bone,
+                          {.table = recipe.tissues, .known_tissue = &anatomy.known_tissue}));
   std::vector<HandlePose> poses;
   poses.reserve(segments.size());
   for (const BuiltSegment& segment : segments) poses.push_back(segment.pose);

@@ -43,6 +43,26 @@ BoneParts AllCranium(const HeadSegmentation& head) {
   return parts;
 }
 
+// Writes 1 + place of the tissue where the structure is labelled.
+void TakeTissue(Structure structure, const StiffnessTable& table, PlanLabels* labels) {
+  const VoxelGrid<StructureSet>& sets = labels->grid.structures;
+  const LabelGrid labelled =
+      MaskWhere(sets, [structure](StructureSet set) { return (set & SetOf(structure)) != 0; });
+  if (CountVoxels(labelled) == 0) return;
+  const auto tissue = std::ranges::find(table, StructureKey(structure), &TissueClass::name);
+  if (tissue == table.end()) {
+    labels->notes.push_back(
+        absl::StrCat("The label map has ", StructureKey(structure),
+                     ", and the recipe no tissue of that name: the CT decides."));
+    return;
+  }
+  if (labels->tissue.values.empty()) labels->tissue = LabelGrid(sets.geometry);
+  for (size_t i = 0; i < labelled.values.size(); ++i) {
+    if (labelled.values[i] == 0) continue;
+    labels->tissue.values[i] = static_cast<uint8_t>(1 + (tissue - table.begin()));
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<std::optional<PlanLabels>> ReadPlanLabels(const Recipe& recipe,
@@ -72,7 +92,8 @@ absl::StatusOr<std::optional<PlanLabels>> ReadPlanLabels(const Recipe& recipe,
   return labels;
 }
 
-absl::StatusOr<BoneParts> SeparateByLabels(absl::StatusOr<BoneParts> parts, HeadSegmentation* head,
+absl::StatusOr<BoneParts> SeparateByLabels(absl::StatusOr<BoneParts> parts,
+                                           const StiffnessTable& table, HeadSegmentation* head,
                                            PlanLabels* labels) {
   labels->grid = CropLabels(labels->grid, head->hu.geometry);
   const bool separated = parts.ok();
@@ -84,6 +105,9 @@ absl::StatusOr<BoneParts> SeparateByLabels(absl::StatusOr<BoneParts> parts, Head
   }
   labels->agreement = CompareLabels(labels->grid, *head, result);
   ApplyLabels(labels->grid, head, &result);
+  for (const Structure structure : {Structure::kMuscle, Structure::kFat}) {
+    TakeTissue(structure, table, labels);
+  }
   labels->grid = {};
   TF_RETURN_IF_ERROR(CheckLowerJawInView(result));
   return result;

@@ -28,6 +28,7 @@ struct PlanLabels {
   LabelFit fit;
   ClearedByLabels cleared;
   LabelAgreement agreement;  // after SeparateByLabels
+  LabelGrid tissue;          // TetStiffnessOptions::known_tissue; without voxels: none
   LabelledGrid grid;         // until SeparateByLabels on the CT's grid, then without voxels
 };
 
@@ -41,11 +42,13 @@ absl::StatusOr<std::optional<PlanLabels>> ReadPlanLabels(const Recipe& recipe,
                                                          HuGrid* ct);
 
 // Takes the labelled bone in place of what the image alone gave, and compares both. `parts` may be
-// an error of SeparateBoneParts: a map of both jaws needs no separation by the image.
+// an error of SeparateBoneParts: a map of both jaws needs no separation by the image. Labelled
+// muscle and fat become the tissues of these names in `table`.
 //
 // Errors: that of `parts` where the map lacks a jaw; InvalidArgument when the image cuts the lower
 // jaw off.
-absl::StatusOr<BoneParts> SeparateByLabels(absl::StatusOr<BoneParts> parts, HeadSegmentation* head,
+absl::StatusOr<BoneParts> SeparateByLabels(absl::StatusOr<BoneParts> parts,
+                                           const StiffnessTable& table, HeadSegmentation* head,
                                            PlanLabels* labels);
 
 }  // namespace tissueform

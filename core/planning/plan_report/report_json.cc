@@ -109,7 +109,8 @@ Json StiffnessJson(const PlanBuild& build, const PlanMeasures& measures) {
           {"tets_from_voxels", build.stiffness.from_voxels},
           {"tets_from_barycentre", build.stiffness.from_barycentre},
           {"tets_from_surroundings", build.stiffness.from_surroundings},
-          {"tets_from_mixed_voxels", build.stiffness.from_mixed_voxels}};
+          {"tets_from_mixed_voxels", build.stiffness.from_mixed_voxels},
+          {"tets_from_labels", build.stiffness.from_known_tissue}};
 }
 
 int64_t CountOf(const std::vector<uint8_t>& labels, size_t label) {

@@ -208,14 +208,43 @@ TEST_F(PlanLabelsTest, LabelsSeparateJawsThatTheImageDoesNot) {
   HuGrid ct = truth->head.hu;
   ASSERT_OK_AND_ASSIGN(std::optional<PlanLabels> labels, ReadPlanLabels(recipe, "", 1, &ct));
   HeadSegmentation head = truth->head;
-  ASSERT_OK_AND_ASSIGN(
-      const BoneParts parts,
-      SeparateByLabels(absl::InvalidArgumentError("the jaws are one piece"), &head, &*labels));
+  ASSERT_OK_AND_ASSIGN(const BoneParts parts,
+                       SeparateByLabels(absl::InvalidArgumentError("the jaws are one piece"),
+                                        recipe.tissues, &head, &*labels));
   EXPECT_EQ(parts.separation, JawSeparation::kLabels);
   const auto jaw = [](const BoneParts& of) {
     return CountVoxels(MaskWhere(of.labels, [](uint8_t part) { return part == kMandible; }));
   };
   EXPECT_NEAR(jaw(parts), jaw(truth->parts), 0.02 * jaw(truth->parts));
+}
+
+TEST_F(PlanLabelsTest, MuscleAndFatAreTissuesOfTheTable) {
+  LabelGrid soft = *named;
+  for (size_t i = 0; i < soft.values.size(); ++i) {
+    if (soft.values[i] == 0 && truth->head.head.values[i] != 0) soft.values[i] = 9;
+  }
+  Recipe recipe = RecipeOfHead();
+  recipe.labels = {.file = WriteNrrd("soft", soft),
+                   .names = {{Structure::kSkull, "", kSkullLabel}, {Structure::kMuscle, "", 9}},
+                   .convention = {}};
+  HuGrid ct = truth->head.hu;
+  HeadSegmentation head = truth->head;
+  ASSERT_OK_AND_ASSIGN(std::optional<PlanLabels> labels, ReadPlanLabels(recipe, "", 1, &ct));
+  ASSERT_TRUE(SeparateByLabels(truth->parts, recipe.tissues, &head, &*labels).ok());
+  TetStiffnessOptions options{.known_tissue = &labels->tissue};
+  ASSERT_OK_AND_ASSIGN(const TetStiffness stiffness,
+                       ComputeTetStiffness(truth->mesh.mesh, head.hu, head.bone, options));
+  EXPECT_EQ(options.table[1].name, "muscle");
+  // All of the soft tissue but what lies in air or bone that were filled.
+  EXPECT_GT(stiffness.from_known_tissue, 0.8 * truth->mesh.mesh.num_tets());
+  EXPECT_GE(std::ranges::count(stiffness.tissue, 1), stiffness.from_known_tissue);
+  EXPECT_EQ(truth->stiffness.from_known_tissue, 0);
+
+  recipe.tissues[1].name = "flesh";
+  ASSERT_OK_AND_ASSIGN(labels, ReadPlanLabels(recipe, "", 1, &ct));
+  ASSERT_TRUE(SeparateByLabels(truth->parts, recipe.tissues, &head, &*labels).ok());
+  EXPECT_TRUE(labels->tissue.values.empty());
+  EXPECT_THAT(labels->notes.back(), HasSubstr("no tissue of that name"));
 }
 
 absl::Status Outcome(const std::string& labels) {
