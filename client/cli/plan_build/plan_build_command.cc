@@ -30,6 +30,7 @@ struct PlanBuildArguments {
   std::string ct;
   std::string recipe;
   std::string surfaces;
+  std::string labels;
   std::string out;
   std::string stats;
   int threads = 0;
@@ -83,6 +84,7 @@ absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& argume
                       CallPlanBuild({.ct = arguments.ct,
                                      .recipe = arguments.recipe,
                                      .surfaces = arguments.surfaces,
+                                     .labels = arguments.labels,
                                      .folder = folder.path(),
                                      .folder_name = arguments.out,
                                      .threads = arguments.threads,
@@ -135,6 +137,7 @@ constexpr char kFooter[] =
     "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
     "  tissueform plan build --ct head.nrrd --recipe recipe.json --out head --no-pictures\n"
     "  tissueform plan build --surfaces surfaces.json --out head\n"
+    "  tissueform plan build --ct series/ --labels bones.seg.nrrd --recipe recipe.json --out head\n"
     "Exit codes: 0 done, 1 the work failed or the plan is not ready, 2 wrong use, 128 + signal "
     "when ended by one.";
 
@@ -161,6 +164,12 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
                    "bones (docs/bring-your-own.md)")
       ->excludes(recipe);
   input->require_option(1);
+  build
+      ->add_option("--labels", arguments->labels,
+                   "label map of this CT (.seg.nrrd .nrrd .nii .nii.gz .mha or DICOM SEG); its "
+                   "bones, teeth and hollows take the place of what thresholds find "
+                   "(docs/bring-your-own.md)")
+      ->needs(ct);
   build->add_option("--out", arguments->out, "folder for the plan: a new or an empty one")
       ->required();
   build

@@ -62,7 +62,8 @@ struct ResampledCt {
   CtProvenance provenance;
   std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
-  LabelGrid unscanned;  // core/imaging/ct/unscanned.h
+  std::string frame_uid;  // CtVolume::frame_uid
+  LabelGrid unscanned;    // core/imaging/ct/unscanned.h
   CtWithMetal ct;
 };
 
@@ -72,6 +73,7 @@ struct Anatomy {
   Landmarks landmarks;
   std::optional<FrankfortLandmarks> frankfort;
   HeadFrame frame;
+  LabelGrid known_tissue;  // PlanLabels::tissue
 };
 
 // What CT and surfaces lead to alike, and from which a plan is built.
@@ -82,6 +84,7 @@ struct Source {
   MetalReport metal;
   HuGrid before_correction;
   Anatomy anatomy;
+  std::optional<PlanLabels> labels;
   std::optional<LabelGrid> tissue_class;  // what the stiffness goes by, where it is not HU
   std::optional<LabelGrid> segments;      // where they are not cut: as DividedBone::labels
 };
@@ -106,6 +109,7 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
   ResampledCt result{.provenance = std::move(volume.provenance),
                      .size = volume.size,
                      .spacing_mm = volume.spacing_mm,
+                     .frame_uid = volume.frame_uid,
                      .unscanned = {},
                      .ct = {}};
   TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
@@ -126,17 +130,36 @@ absl::StatusOr<Anatomy> WithFrame(HeadSegmentation head, BoneParts parts,
                  .parts = std::move(parts),
                  .landmarks = landmarks,
                  .frankfort = frankfort,
-                 .frame = std::move(frame)};
+                 .frame = std::move(frame),
+                 .known_tissue = {}};
 }
 
-absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
-                                    const Recipe& recipe, Progress* progress) {
+struct HeadAndBone {
+  HeadSegmentation head;
+  absl::StatusOr<BoneParts> parts;  // an error where the jaws cannot be separated
+};
+
+// `labels` may be empty; gets the comparison with what the image alone shows.
+absl::StatusOr<HeadAndBone> SegmentBone(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                        const Recipe& recipe, std::optional<PlanLabels>* labels,
+                                        Progress* progress) {
   progress->Begin("finding head and bone", 0.12, 0.3);
   TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct.hu, recipe.segmentation,
                                                          progress->Parts(), ct.metal, unscanned));
   progress->Begin("separating bones", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
+  if (labels->has_value())
+    parts = SeparateByLabels(std::move(parts), recipe.tissues, &head, &**labels);
+  return HeadAndBone{std::move(head), std::move(parts)};
+}
+
+absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                    const Recipe& recipe, std::optional<PlanLabels>* labels,
+                                    Progress* progress) {
+  TF_ASSIGN_OR_RETURN(HeadAndBone bone, SegmentBone(ct, unscanned, recipe, labels, progress));
+  HeadSegmentation& head = bone.head;
+  absl::StatusOr<BoneParts>& parts = bone.parts;
   const bool plane_given = recipe.occlusal_plane.has_value();
   if (!parts.ok()) return ExplainMissingAnatomy(head, plane_given, parts.status());
   progress->Begin("finding landmarks", 0.42, 0.46);
@@ -144,7 +167,10 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unsc
   const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
   if (!found.ok()) return ExplainMissingAnatomy(head, plane_given, found);
   TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
-  return WithFrame(std::move(head), *std::move(parts), *landmarks, recipe);
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy,
+                      WithFrame(std::move(head), *std::move(parts), *landmarks, recipe));
+  if (labels->has_value()) anatomy.known_tissue = std::move((*labels)->tissue);
+  return anatomy;
 }
 
 // Surfaces tell the bones apart: only the landmarks are found.
@@ -283,7 +309,8 @@ absl::StatusOr<TetStiffness> Stiffness(const TetMesh& mesh, const Source& source
                                        const StiffnessTable& table) {
   if (source.tissue_class) return StiffnessByClass(mesh, *source.tissue_class, table);
   const HeadSegmentation& head = source.anatomy.head;
-  return ComputeTetStiffness(mesh, head.hu, head.bone, {.table = table});
+  return ComputeTetStiffness(mesh, head.hu, head.bone,
+                             {.table = table, .known_tissue = &source.anatomy.known_tissue});
 }
 
 // What the tets are made of and what holds the vertices.
@@ -322,14 +349,18 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
 absl::StatusOr<Source> SourceOfCt(const std::string& path, const Recipe& recipe, int threads,
                                   Progress* progress) {
   TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(path, recipe, threads, progress));
+  if (!recipe.labels.file.empty()) progress->Begin("reading the label map", 0.12, 0.12);
+  TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
+                      ReadPlanLabels(recipe, ct.frame_uid, threads, &ct.ct.hu));
   // The head has HU of its own, as large as the CT's; the next stages need the room.
-  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, progress));
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, &labels, progress));
   return Source{.provenance = std::move(ct.provenance),
                 .size = ct.size,
                 .spacing_mm = ct.spacing_mm,
                 .metal = std::move(ct.ct.report),
                 .before_correction = std::move(ct.ct.before),
                 .anatomy = std::move(anatomy),
+                .labels = std::move(labels),
                 .tissue_class = {},
                 .segments = {}};
 }
@@ -363,6 +394,20 @@ std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
   names.reserve(segments.size());
   for (const BuiltSegment& segment : segments) names.push_back(segment.cut.name);
   return names;
+}
+
+absl::StatusOr<PlanLabels> CompareWithLabels(const std::string& ct_path, const Recipe& recipe,
+                                             const PlanBuildOptions& options) {
+  Progress progress(options.tell);
+  SetFilterThreads(options.threads);
+  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
+  TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
+                      ReadPlanLabels(recipe, ct.frame_uid, options.threads, &ct.ct.hu));
+  if (!labels) return absl::InvalidArgumentError("no label map is named; use --labels");
+  TF_ASSIGN_OR_RETURN(const HeadAndBone bone,
+                      SegmentBone(ct.ct, ct.unscanned, recipe, &labels, &progress));
+  TF_RETURN_IF_ERROR(bone.parts.status());
+  return *std::move(labels);
 }
 
 namespace {
@@ -425,6 +470,7 @@ absl::StatusOr<PlanBuild> BuildFromSource(Source source, const Recipe& recipe,
                    .num_inverted = description.released.num_inverted,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage),
+                   .labels = std::move(source.labels),
                    .lips = std::move(lips),
                    .frankfort = anatomy.frankfort,
                    .head_frame = std::move(anatomy.frame),

@@ -34,6 +34,8 @@ const char* SeparationText(JawSeparation separation) {
       return "the teeth touch: separated by the plane between them with the best clearance";
     case JawSeparation::kGiven:
       return "skull and lower jaw were given apart";
+    case JawSeparation::kLabels:
+      return "by the label map";
     case JawSeparation::kGivenCut:
       break;
   }
