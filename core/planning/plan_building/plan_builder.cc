@@ -373,7 +373,6 @@ absl::StatusOr<Source> SourceOfSurfaces(SurfacesInput input, int threads, Progre
   std::vector<std::string>& notes = input.provenance.notes;
   notes.insert(notes.end(), made.notes.begin(), made.notes.end());
   std::optional<LabelGrid> segments = std::move(made.segments);
-                .labels = {},
   std::optional<LabelGrid> tissue_class = std::move(made.tissue_class);
   const GridGeometry geometry = made.head.hu.geometry;
   TF_ASSIGN_OR_RETURN(Anatomy anatomy,
@@ -384,6 +383,7 @@ absl::StatusOr<Source> SourceOfSurfaces(SurfacesInput input, int threads, Progre
                 .metal = {},
                 .before_correction = {},
                 .anatomy = std::move(anatomy),
+                .labels = {},
                 .tissue_class = std::move(tissue_class),
                 .segments = std::move(segments)};
 }
