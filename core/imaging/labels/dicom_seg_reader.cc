@@ -176,8 +176,10 @@ absl::StatusOr<std::vector<LabelSegment>> TallySegments(const Pixels& pixels, co
     if (tallies.size() > static_cast<size_t>(max_segments)) return;
     LabelSegment& tally = tallies[number];
     ++tally.voxels;
-    tally.middle_mm += Eigen::Vector3d(static_cast<double>(index % columns),
-                                       static_cast<double>(index / columns), frame.slice);
+    const size_t column = index % columns;
+    const size_t row = index / columns;
+    tally.middle_mm +=
+        Eigen::Vector3d(static_cast<double>(column), static_cast<double>(row), frame.slice);
   });
   if (tallies.size() > static_cast<size_t>(max_segments)) {
     return absl::ResourceExhaustedError(
