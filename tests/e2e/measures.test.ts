@@ -235,7 +235,7 @@ describe("the bundled head", () => {
     await stored.waitFor();
     await open(page, "Report");
     await page.getByRole("button", { name: "Open the report" }).click();
-    await page.getByRole("row", { name: "Lower lip to E-line" }).getByText(/\d to /).waitFor();
+    await page.locator(".report").getByRole("row", { name: "Lower lip to E-line" }).getByText(/\d to /).waitFor();
     expect(await page.locator(".report img").evaluateAll((pictures) => pictures.map((picture) => (picture as HTMLImageElement).naturalWidth))).toEqual([480, 480, 480]);
     const pdf = (await page.pdf({ preferCSSPageSize: true })).toString("latin1");
     expect(pdf.match(/\/Type\s*\/Page\b/g)?.length).toBe(1);

@@ -58,14 +58,15 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         Target{"plan", FuzzPlan}, Target{"mesh_validation", FuzzMeshValidation},
         Target{"mesh_payload", FuzzMeshPayload}, Target{"dicom_series", FuzzDicomSeries},
-        Target{"volume_header", FuzzVolumeHeader}, Target{"recipe", FuzzRecipe},
-        Target{"medit", FuzzMeditLines}, Target{"displacements", FuzzDisplacements},
-        Target{"store_record", FuzzStoreRecord}, Target{"deform_stream", FuzzDeformStream},
-        Target{"case_file", FuzzCaseFile}, Target{"case_upload", FuzzCaseUpload},
-        Target{"answers", FuzzAnswers}, Target{"socket_frame", FuzzSocketFrame},
-        Target{"web_request", FuzzWebRequest}, Target{"gateway_connection", FuzzGatewayConnection},
-        Target{"token", FuzzToken}, Target{"token_keys", FuzzTokenKeys},
-        Target{"multipart", FuzzMultipart}, Target{"instance_header", FuzzInstanceHeader}),
+        Target{"volume_header", FuzzVolumeHeader}, Target{"labels", FuzzLabels},
+        Target{"recipe", FuzzRecipe}, Target{"medit", FuzzMeditLines},
+        Target{"displacements", FuzzDisplacements}, Target{"store_record", FuzzStoreRecord},
+        Target{"deform_stream", FuzzDeformStream}, Target{"case_file", FuzzCaseFile},
+        Target{"case_upload", FuzzCaseUpload}, Target{"answers", FuzzAnswers},
+        Target{"socket_frame", FuzzSocketFrame}, Target{"web_request", FuzzWebRequest},
+        Target{"gateway_connection", FuzzGatewayConnection}, Target{"token", FuzzToken},
+        Target{"token_keys", FuzzTokenKeys}, Target{"multipart", FuzzMultipart},
+        Target{"instance_header", FuzzInstanceHeader}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -30,6 +30,10 @@ void FuzzDicomSeries(const uint8_t* data, size_t size);
 // NIfTI (ReadVolumeHeader, UnpackedSize): no header chooses a file in another folder.
 void FuzzVolumeHeader(const uint8_t* data, size_t size);
 
+// Names of segments in NRRD and NIfTI, and the frames of a DICOM SEG (AssignStructures,
+// ArrangeSegFrames): messages are printable lines, and every frame is in the grid.
+void FuzzLabels(const uint8_t* data, size_t size);
+
 // The text of a recipe (ParseRecipe), as FuzzPlan.
 void FuzzRecipe(const uint8_t* data, size_t size);
 

@@ -17,7 +17,7 @@ cd "$(dirname "$0")/../.."
 seconds=${1:-20}
 build_dir=${TISSUEFORM_BUILD_DIR:-$PWD/build/fuzz}
 declare -A corpora=([FuzzPlan]=plan [FuzzMeshValidation]=mesh_validation [FuzzMeshPayload]=mesh_payload
-  [FuzzDicomSeries]=dicom_series [FuzzVolumeHeader]=volume_header [FuzzRecipe]=recipe [FuzzMeditLines]=medit
+  [FuzzDicomSeries]=dicom_series [FuzzVolumeHeader]=volume_header [FuzzLabels]=labels [FuzzRecipe]=recipe [FuzzMeditLines]=medit
   [FuzzDisplacements]=displacements [FuzzStoreRecord]=store_record [FuzzDeformStream]=deform_stream [FuzzCaseFile]=case_file
   [FuzzCaseUpload]=case_upload [FuzzAnswers]=answers [FuzzSocketFrame]=socket_frame [FuzzWebRequest]=web_request
   [FuzzMultipart]=multipart [FuzzInstanceHeader]=instance_header

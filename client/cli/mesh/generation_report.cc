@@ -36,6 +36,27 @@ std::string SurfaceText(const GenerationReport& report) {
       DefectsText(report.defects.defects));
 }
 
+std::string WrappingText(const GenerationReport& report) {
+  if (!report.wrapped) return "";
+  const WrappedSurface& wrap = *report.wrapped;
+  std::string text = absl::StrFormat(
+      "wrapped at %g mm (alpha %g mm)\n"
+      "  triangles          %10d\n"
+      "  wrap to surface    %10.3g mm at most\n"
+      "  surface to wrap    %10.3g mm at most; %.1f %% is farther than 1.5 offsets (bridged gaps, "
+      "inner walls)\n"
+      "  enclosed volume    %10.4g mm^3\n",
+      report.wrap_mm, kAlphaPerOffset * report.wrap_mm, wrap.mesh.num_triangles(),
+      wrap.largest_to_surface_mm, wrap.largest_from_surface_mm, 100 * wrap.covered_fraction,
+      wrap.volume_mm3);
+  if (wrap.is_sheet) {
+    absl::StrAppend(&text,
+                    "  warning: the wrap went through an opening and follows both sides; close the "
+                    "opening or use a larger --wrap-mm\n");
+  }
+  return text;
+}
+
 std::string RemeshingText(const GenerationReport& report) {
   if (!report.remeshed) return "";
   const RemeshedSurface& remeshed = *report.remeshed;
@@ -61,6 +82,19 @@ OrderedJson SurfaceJson(const GenerationReport& report) {
           {"defects", DefectsJson(report.defects.defects)}};
 }
 
+OrderedJson WrappingJson(const GenerationReport& report) {
+  if (!report.wrapped) return nullptr;
+  const WrappedSurface& wrap = *report.wrapped;
+  return {{"offset_mm", report.wrap_mm},
+          {"alpha_mm", kAlphaPerOffset * report.wrap_mm},
+          {"triangles", wrap.mesh.num_triangles()},
+          {"largest_to_surface_mm", wrap.largest_to_surface_mm},
+          {"largest_from_surface_mm", wrap.largest_from_surface_mm},
+          {"covered_fraction", wrap.covered_fraction},
+          {"enclosed_volume_mm3", wrap.volume_mm3},
+          {"is_sheet", wrap.is_sheet}};
+}
+
 OrderedJson RemeshingJson(const GenerationReport& report) {
   if (!report.remeshed) return nullptr;
   return {{"edge_mm", report.remesh_mm},
@@ -72,7 +106,7 @@ OrderedJson RemeshingJson(const GenerationReport& report) {
 }  // namespace
 
 std::string GenerationReportText(const GenerationReport& report) {
-  std::string text = absl::StrCat(SurfaceText(report), RemeshingText(report));
+  std::string text = absl::StrCat(SurfaceText(report), WrappingText(report), RemeshingText(report));
   if (!report.defect_file.empty()) {
     absl::StrAppend(&text, "triangles by defect  ", report.defect_file, "\n");
   }
@@ -83,6 +117,7 @@ std::string GenerationReportText(const GenerationReport& report) {
 OrderedJson GenerationReportJson(const GenerationReport& report) {
   OrderedJson json = {{"filled", report.made.has_value()},
                       {"surface", SurfaceJson(report)},
+                      {"wrapping", WrappingJson(report)},
                       {"remeshing", RemeshingJson(report)},
                       {"defect_file", nullptr},
                       {"mesh", nullptr}};

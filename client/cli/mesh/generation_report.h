@@ -10,6 +10,7 @@
 
 #include "core/mesh/generation/surface_defects.h"
 #include "core/mesh/generation/surface_remeshing.h"
+#include "core/mesh/generation/surface_wrapping.h"
 #include "core/mesh/io/file_space.h"
 #include "core/mesh/io/tet_mesh_io.h"
 #include "core/mesh/validation.h"
@@ -22,7 +23,9 @@ struct GenerationReport {
   FileSpace space = FileSpace::kUnstated;
   SurfaceDefects defects;
   std::string defect_file;  // empty: none was written
-  double remesh_mm = 0;     // 0: the triangles were kept
+  double wrap_mm = 0;       // 0: not wrapped
+  std::optional<WrappedSurface> wrapped;
+  double remesh_mm = 0;  // 0: the triangles were kept
   std::optional<RemeshedSurface> remeshed;
   std::string mesh;                 // the file
   std::optional<TetMeshFile> made;  // none: refused

@@ -11,6 +11,7 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
 
 #include "client/cli/mesh/generation_report.h"
@@ -28,6 +29,7 @@ struct MeshGenerateOptions {
   std::string surface;
   std::string out;
   std::string defects;
+  double wrap_mm = 0;
   double remesh_mm = 0;
   double edge_mm = 0;
   bool split_surface = false;
@@ -89,11 +91,25 @@ absl::Status WriteDefects(const MeshGenerateOptions& options, const TriangleMesh
       {.mesh = surface, .point_data = {}, .cell_data = {FlawArray(report->defects)}});
 }
 
-// The surface that is filled: the one of the file, or a remeshed one.
+// The surface of the file, or its wrap.
+absl::StatusOr<TriangleMesh> OuterSurface(const MeshGenerateOptions& options,
+                                          const TriangleMesh& surface, GenerationReport* report) {
+  if (options.wrap_mm == 0) return surface;
+  const StageProgress progress("wrapping the surface");
+  WrappingOptions wrapping;
+  wrapping.offset_mm = report->wrap_mm = options.wrap_mm;
+  wrapping.limits = Filling(options).limits;
+  TF_ASSIGN_OR_RETURN(report->wrapped, WrapSurface(surface, wrapping));
+  return report->wrapped->mesh;
+}
+
+// The surface that is filled: the one of the file, its wrap, or either of them remeshed.
 absl::StatusOr<TriangleMesh> SurfaceToFill(const MeshGenerateOptions& options,
-                                           const TriangleMesh& surface, GenerationReport* report) {
+                                           const TriangleMesh& file_surface,
+                                           GenerationReport* report) {
+  TF_ASSIGN_OR_RETURN(const TriangleMesh surface, OuterSurface(options, file_surface, report));
   if (options.remesh_mm == 0) {
-    TF_RETURN_IF_ERROR(CheckMeshable(report->defects));
+    if (!report->wrapped) TF_RETURN_IF_ERROR(CheckMeshable(report->defects));
     return surface;
   }
   const StageProgress progress("remeshing the surface");
@@ -119,12 +135,31 @@ absl::StatusOr<TetMeshFile> Make(const MeshGenerateOptions& options, const Trian
   return Fill(options, to_fill);
 }
 
+// An offset that is larger than this part of the surface's diagonal changes its shape: it is not
+// recommended.
+constexpr double kLargestUsefulOffset = 0.02;
+
+// The option that would fill this surface; empty where none would.
+std::string WrapAdvice(const MeshGenerateOptions& options, const TriangleMesh& surface,
+                       const SurfaceDefects& defects) {
+  const bool has_shape =
+      defects.Find("non_finite_vertices") == nullptr && defects.report.area_mm2 > 0;
+  if (options.wrap_mm > 0 || defects.can_be_meshed() || !has_shape) return "";
+  const Eigen::RowVector3d size =
+      surface.positions().colwise().maxCoeff() - surface.positions().colwise().minCoeff();
+  const double offset_mm = OffsetThatBridges(surface);
+  if (offset_mm > kLargestUsefulOffset * size.norm()) return "";
+  if (offset_mm == 0) return "; to fill it, wrap it (`--wrap-mm`)";
+  return absl::StrFormat("; to fill it, wrap it (`--wrap-mm` %.2g or more bridges its openings)",
+                         offset_mm * 1.05);
+}
+
 absl::Status Refuse(const MeshGenerateOptions& options, const TriangleMesh& surface,
                     const absl::Status& why, GenerationReport* report) {
-  std::string look;
+  std::string look = WrapAdvice(options, surface, report->defects);
   if (!report->defects.can_be_meshed()) {
     TF_RETURN_IF_ERROR(WriteDefects(options, surface, report));
-    look = absl::StrCat("; see ", report->defect_file);
+    absl::StrAppend(&look, "; see ", report->defect_file);
   }
   PrintReport(options.json, GenerationReportText(*report), GenerationReportJson(*report));
   return {why.code(), absl::StrCat("surface ", options.surface, ": ", why.message(), look)};
@@ -141,6 +176,8 @@ absl::Status RunMeshGenerate(const MeshGenerateOptions& options) {
                           .space = file.space,
                           .defects = LookForDefects(file.mesh),
                           .defect_file = "",
+                          .wrap_mm = 0,
+                          .wrapped = {},
                           .remesh_mm = 0,
                           .remeshed = {},
                           .mesh = options.out,
@@ -156,6 +193,13 @@ absl::Status RunMeshGenerate(const MeshGenerateOptions& options) {
 
 void AddQualityOptions(CLI::App* generate, MeshGenerateOptions* options) {
   TetrahedralizationOptions& filling = options->filling;
+  generate
+      ->add_option("--wrap-mm", options->wrap_mm,
+                   absl::StrCat("wrap the surface first, at this distance: fills open, "
+                                "intersecting and separate pieces; gaps up to ",
+                                2 * kAlphaPerOffset, " times as wide are bridged (alpha is ",
+                                kAlphaPerOffset, " times the distance)"))
+      ->check(CLI::PositiveNumber);
   generate
       ->add_option("--remesh-mm", options->remesh_mm,
                    "remesh the surface to edges of this length first")
@@ -203,15 +247,16 @@ void AddPartOptions(CLI::App* generate, MeshGenerateOptions* options) {
 }
 
 constexpr char kFooter[] =
-    "The surface must be closed and must not intersect itself. Otherwise the report "
-    "says\n"
-    "why, and the array `defect` of the .vtp file marks each triangle: 1 turned, 2 open edge,\n"
+    "The surface must be closed and must not intersect itself, or be wrapped with --wrap-mm.\n"
+    "Otherwise the report says why, and the array `defect` of the .vtp file marks each triangle: 1 "
+    "turned, 2 open edge,\n"
     "3 edge of three or more triangles, 4 intersects another, 5 duplicate, 6 no area. Walls of\n"
     "cavities face inward. The surface's vertices come first in the mesh.\n"
     "Examples:\n"
     "  tissueform mesh generate tongue.obj --out tongue.vtu\n"
     "  tissueform mesh generate face.stl --out face.vtu --remesh-mm 3 --edge-mm 5\n"
     "  tissueform mesh generate jaw.ply --out jaw.vtu --region 0,12,4,1 --region 0,30,4,2,0.5\n"
+    "  tissueform mesh generate skull.stl --out skull.vtu --wrap-mm 0.5\n"
     "  tissueform mesh generate skull.obj --out skull.vtu --defects why.vtp --json\n"
     "Exit code 0: filled. 1: the surface cannot be filled or read. 2: wrong use.";
 

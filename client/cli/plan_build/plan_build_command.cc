@@ -29,6 +29,8 @@ namespace {
 struct PlanBuildArguments {
   std::string ct;
   std::string recipe;
+  std::string surfaces;
+  std::string labels;
   std::string out;
   std::string stats;
   int threads = 0;
@@ -81,6 +83,8 @@ absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& argume
   TF_ASSIGN_OR_RETURN(PlanBuildAnswer made,
                       CallPlanBuild({.ct = arguments.ct,
                                      .recipe = arguments.recipe,
+                                     .surfaces = arguments.surfaces,
+                                     .labels = arguments.labels,
                                      .folder = folder.path(),
                                      .folder_name = arguments.out,
                                      .threads = arguments.threads,
@@ -132,6 +136,8 @@ constexpr char kFooter[] =
     "Examples:\n"
     "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
     "  tissueform plan build --ct head.nrrd --recipe recipe.json --out head --no-pictures\n"
+    "  tissueform plan build --surfaces surfaces.json --out head\n"
+    "  tissueform plan build --ct series/ --labels bones.seg.nrrd --recipe recipe.json --out head\n"
     "Exit codes: 0 done, 1 the work failed or the plan is not ready, 2 wrong use, 128 + signal "
     "when ended by one.";
 
@@ -139,15 +145,31 @@ constexpr char kFooter[] =
 
 void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
   auto arguments = std::make_shared<PlanBuildArguments>();
-  CLI::App* build = app.add_subcommand("build", "build a plan from a CT of a head");
+  CLI::App* build =
+      app.add_subcommand("build", "build a plan from a CT of a head, or from its surfaces");
+  auto* ct = build->add_option(
+      "--ct", arguments->ct,
+      "folder of a DICOM series, a study or a CD, or a DICOM file, or a volume (.nii "
+      ".nii.gz .nrrd "
+      ".nhdr .mha .mhd)");
+  auto* recipe =
+      build->add_option("--recipe", arguments->recipe, "the recipe (docs/recipe-format.md)");
+  ct->needs(recipe);
+  recipe->needs(ct);
+  auto* input = build->add_option_group("input", "a CT with a recipe, or surfaces");
+  input->add_options(ct);
+  input
+      ->add_option("--surfaces", arguments->surfaces,
+                   "instead of a CT and a recipe: JSON file that names the surfaces of skin and "
+                   "bones (docs/bring-your-own.md)")
+      ->excludes(recipe);
+  input->require_option(1);
   build
-      ->add_option("--ct", arguments->ct,
-                   "folder of a DICOM series, a study or a CD, or a DICOM file, or a volume (.nii "
-                   ".nii.gz .nrrd "
-                   ".nhdr .mha .mhd)")
-      ->required();
-  build->add_option("--recipe", arguments->recipe, "the recipe (docs/recipe-format.md)")
-      ->required();
+      ->add_option("--labels", arguments->labels,
+                   "label map of this CT (.seg.nrrd .nrrd .nii .nii.gz .mha or DICOM SEG); its "
+                   "bones, teeth and hollows take the place of what thresholds find "
+                   "(docs/bring-your-own.md)")
+      ->needs(ct);
   build->add_option("--out", arguments->out, "folder for the plan: a new or an empty one")
       ->required();
   build

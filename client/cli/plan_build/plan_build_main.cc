@@ -16,6 +16,7 @@
 #include "core/planning/plan_building/plan_build_call.h"
 #include "core/planning/plan_building/plan_builder.h"
 #include "core/planning/plan_report/cautions.h"
+#include "core/planning/plan_report/labels_report.h"
 #include "core/planning/plan_report/plan_measures.h"
 #include "core/planning/plan_report/plan_report.h"
 #include "core/planning/rendering/virtual_display.h"
@@ -43,8 +44,9 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
                           OsteotomyKindName(segment.cut.kind), segment.volume_mm3 / 1000);
   }
   for (const std::string& note : build.ct.notes) {
-    absl::StrAppend(&made.text, "CT      ", note, "\n");
+    absl::StrAppend(&made.text, request.surfaces.empty() ? "CT      " : "input   ", note, "\n");
   }
+  if (build.labels) absl::StrAppend(&made.text, LabelsText(*build.labels));
   absl::StrAppendFormat(&made.text, "report  %s/report.html: %s\n", request.folder_name,
                         made.ready
                             ? "all quality requirements are met"
@@ -62,9 +64,34 @@ PlanBuildAnswer Outcome(const PlanBuildRequest& request, const PlanBuild& build)
   return made;
 }
 
+absl::StatusOr<Recipe> RecipeOf(const PlanBuildRequest& request) {
+  Recipe recipe;
+  if (!request.recipe.empty()) {
+    TF_ASSIGN_OR_RETURN(recipe, ReadRecipe(request.recipe));
+  }
+  if (!request.labels.empty()) recipe.labels.file = request.labels;
+  return recipe;
+}
+
+absl::StatusOr<PlanBuild> BuildFromInput(const PlanBuildRequest& request,
+                                         const StageFunction& tell) {
+  const PlanBuildOptions options{.threads = request.threads, .tell = Within(tell, 0, kBuildShare)};
+  if (!request.surfaces.empty()) return BuildPlanFromSurfaces(request.surfaces, options);
+  TF_ASSIGN_OR_RETURN(const Recipe recipe, RecipeOf(request));
+  return BuildPlan(request.ct, recipe, options);
+}
+
+absl::StatusOr<PlanBuildAnswer> CompareRequestedLabels(const PlanBuildRequest& request,
+                                                       const StageFunction& tell) {
+  TF_ASSIGN_OR_RETURN(const Recipe recipe, RecipeOf(request));
+  TF_ASSIGN_OR_RETURN(const PlanLabels labels,
+                      CompareWithLabels(request.ct, recipe, {request.threads, tell}));
+  return PlanBuildAnswer{.text = LabelsText(labels), .ready = true, .defects = {}};
+}
+
 absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& request,
                                                    const StageFunction& tell) {
-  TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(request.recipe));
+  if (request.only_compare_labels) return CompareRequestedLabels(request, tell);
   // As deform does: the last digits would depend on their number, and with them what the trial of
   // the planned move finds torn. Threads that wait for each other also cost more than they give.
   SetBlasThreads(1);
@@ -73,9 +100,7 @@ absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& reque
     // First, so that a missing program is told before the work.
     TF_ASSIGN_OR_RETURN(display, VirtualDisplay::Open());
   }
-  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildPlan(request.ct, recipe,
-                                                       {.threads = request.threads,
-                                                        .tell = Within(tell, 0, kBuildShare)}));
+  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildFromInput(request, tell));
   tell("writing the plan", kBuildShare);
   TF_RETURN_IF_ERROR(WritePlan(build, request.folder));
   TF_RETURN_IF_ERROR(WritePlanReport(build,

@@ -12,9 +12,11 @@
 #include "absl/strings/str_format.h"
 
 #include "client/cli/shared/option_checks.h"
+#include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/mesh_defect.h"
 #include "core/planning/model_names.h"
+#include "core/planning/plan_building/plan_build_call.h"
 #include "core/planning/plan_io.h"
 
 namespace tissueform {
@@ -72,10 +74,28 @@ void PrintPlan(const std::string& path, const Plan& plan, const PlanProblem& pro
 
 struct PlanCheckOptions {
   std::string plan;
+  std::string labels;
+  std::string ct;
+  std::string recipe;
   PlanReadOptions reading;
 };
 
+// The Dice coefficients of a label map and of our own segmentation.
+absl::Status CompareLabels(const PlanCheckOptions& options) {
+  TF_ASSIGN_OR_RETURN(const PlanBuildAnswer answer,
+                      CallPlanBuild({.ct = options.ct,
+                                     .recipe = options.recipe,
+                                     .labels = options.labels,
+                                     .only_compare_labels = true,
+                                     .folder = {},
+                                     .folder_name = {},
+                                     .threads = AvailableProcessors()}));
+  absl::PrintF("%s", answer.text);
+  return absl::OkStatus();
+}
+
 absl::Status RunPlanCheck(const PlanCheckOptions& options) {
+  if (!options.labels.empty()) return CompareLabels(options);
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan, options.reading.resolve));
   PrintPlan(options.plan, plan, problem);
@@ -94,14 +114,29 @@ CLI::App* AddPlanCommand(CLI::App& app, CommandWork* work) {
 
   auto options = std::make_shared<PlanCheckOptions>();
   CLI::App* check = plan->add_subcommand("check", "check a plan and its mesh, and summarize it");
-  check->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)")->required();
+  CLI::Option* file =
+      check->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)");
+  CLI::Option* ct = check->add_option("--ct", options->ct, "with --labels: their CT");
+  CLI::Option* labels = check->add_option(
+      "--labels", options->labels,
+      "instead of a plan: compare a label map with the segmentation of its CT (Dice coefficients)");
+  CLI::Option* recipe = check->add_option("--recipe", options->recipe,
+                                          "with --labels: a recipe with its keys \"ct\", "
+                                          "\"segmentation\" and \"labels\"");
+  labels->needs(ct)->excludes(file);
+  ct->needs(labels);
+  recipe->needs(labels);
   AddPlanOptions(check, &options->reading);
   check->footer(
-      "Example:\n"
+      "Examples:\n"
       "  tissueform plan check plan.json\n"
+      "  tissueform plan check --ct series/ --labels bones.seg.nrrd\n"
       "Exit code 0: the plan is valid. 1: it is not; the line on stderr names the key and what "
       "to do.");
-  check->callback([options, work] { *work = [options] { return RunPlanCheck(*options); }; });
+  check->callback([options, work] {
+    if (options->plan.empty() && options->labels.empty()) throw CLI::RequiredError("PLAN");
+    *work = [options] { return RunPlanCheck(*options); };
+  });
   return plan;
 }
 

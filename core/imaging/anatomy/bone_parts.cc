@@ -61,17 +61,6 @@ absl::Status NoLowerJaw() {
 // A chin that lacks a little is planned on with a caution: its lower rim is not what a plan moves.
 constexpr double kMaxCutOffMm = 3;
 
-absl::Status CheckInView(const BoneParts& parts) {
-  if (parts.cut_off_mm.value_or(0) <= kMaxCutOffMm) return absl::OkStatus();
-  const bool known = std::isfinite(*parts.cut_off_mm);
-  return absl::InvalidArgumentError(
-      absl::StrFormat("about %s mm of the lower jaw are cut off by the lower border of the image "
-                      "at z = %.1f mm; the "
-                      "CT must reach below the chin (up to %g mm may be missing)",
-                      known ? absl::StrFormat("%.0f", *parts.cut_off_mm) : "many",
-                      parts.labels.geometry.origin_mm.z(), kMaxCutOffMm));
-}
-
 // `chin_z_mm` is the lowest, `front_mm` the foremost of the lower jaw. The box is a generous one
 // for an adult: it must hold the crowns of both jaws whether the mouth is open or not, and may hold
 // more, as only what is dense as a tooth counts in it.
@@ -237,6 +226,17 @@ std::optional<DentalCut> ChooseCut(const HeadSegmentation& head,
 
 }  // namespace
 
+absl::Status CheckLowerJawInView(const BoneParts& parts) {
+  if (parts.cut_off_mm.value_or(0) <= kMaxCutOffMm) return absl::OkStatus();
+  const bool known = std::isfinite(*parts.cut_off_mm);
+  return absl::InvalidArgumentError(
+      absl::StrFormat("about %s mm of the lower jaw are cut off by the lower border of the image "
+                      "at z = %.1f mm; the "
+                      "CT must reach below the chin (up to %g mm may be missing)",
+                      known ? absl::StrFormat("%.0f", *parts.cut_off_mm) : "many",
+                      parts.labels.geometry.origin_mm.z(), kMaxCutOffMm));
+}
+
 absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
                                             const std::optional<Plane>& given_cut,
                                             const StageFunction& tell) {
@@ -258,7 +258,7 @@ absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
   RelabelUnmarked(head.bone, seeds, markers.shape(), &result.labels);
   AssignMetal(head, used_cut, &result.labels);
   result.cut_off_mm = CutOffBelowMm(result.labels, kMandible);
-  TF_RETURN_IF_ERROR(CheckInView(result));
+  TF_RETURN_IF_ERROR(CheckLowerJawInView(result));
   result.confidence = ShownBorder(result.labels, head.metal);
   return result;
 }

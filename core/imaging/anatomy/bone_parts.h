@@ -24,6 +24,8 @@ enum class JawSeparation {
   kThreshold,     // they do not touch: above `marker_hu` they are separate pieces
   kAutomaticCut,  // they touch: cut by the plane with the best clearance
   kGivenCut,      // cut by the plane of the caller
+  kGiven,         // the lower jaw was given apart from the skull
+  kLabels,        // as a label map has them (core/imaging/anatomy/labelled_head.h)
 };
 
 struct BoneParts {
@@ -53,5 +55,9 @@ struct BoneParts {
 absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
                                             const std::optional<Plane>& given_cut = std::nullopt,
                                             const StageFunction& tell = nullptr);
+
+// Whether the image holds the lower jaw but for 3 mm, by BoneParts::cut_off_mm. Errors:
+// InvalidArgument when the image's lower border has cut off more.
+absl::Status CheckLowerJawInView(const BoneParts& parts);
 
 }  // namespace tissueform

@@ -25,6 +25,13 @@ constexpr double kUnderChinMm = 15;
 constexpr double kSmallestVolumeMm3 = 20e3;
 constexpr double kBrainDepthMm = 25;  // an orbit is 20 mm deep, a cheek less
 constexpr double kBrainOverJointMm = 10;
+// In front of the spinal canal and as low as the teeth: the face, where a core reaches it.
+constexpr double kFaceBeforeJointMm = 25;
+constexpr double kFaceUnderJointMm = 40;
+// A core that holds both is brain over the orbits' floors and face under the skull's base. Between
+// the two a filled nose with its sinuses may be as deep as a brain.
+constexpr double kSurelyBrainOverJointMm = 35;
+constexpr double kSkullBaseUnderJointMm = 10;
 constexpr uint8_t kFaceMarker = 1;
 constexpr uint8_t kBrainMarker = 2;
 constexpr int kMarginVoxels = 2;
@@ -50,22 +57,41 @@ LabelGrid SoftVoxels(const LabelGrid& head, const LabelGrid& bone_labels) {
   return soft;
 }
 
+// What a connected core holds.
+struct CoreParts {
+  bool brain = false;
+  bool face = false;
+};
+
 // Labels 1 and 2 for the cores of the soft tissue: everything deeper than half the neck, by
 // connected piece; 2 where a piece reaches a depth that only the brain has, over the jaw joints.
-LabelGrid BrainMarkers(const FloatGrid& depth, double neck_mm, double joint_z_mm) {
+// Where airway and sinuses are filled, as in heads from surfaces, one piece may hold brain and
+// face: then only its depth over the joints and what is lower than the skull's base have labels.
+LabelGrid BrainMarkers(const FloatGrid& depth, double neck_mm, const Eigen::Vector3d& joint) {
   const LabelGrid cores = MaskWhere(depth, [=](float mm) { return mm > neck_mm / 2; });
   const Components components = LabelComponents(cores, Neighbours::kFaces);
-  std::vector<uint8_t> marker(components.voxels.size() + 1, kFaceMarker);
-  marker[0] = 0;
+  const auto is_brain = [&](size_t index, const Eigen::Vector3d& place, double over_joint_mm) {
+    return depth.values[index] > kBrainDepthMm && place.z() > joint.z() + over_joint_mm;
+  };
+  std::vector<CoreParts> parts(components.voxels.size() + 1);
   ForEachVoxel(cores, [&](size_t index, const Eigen::Vector3d& place) {
-    if (depth.values[index] > kBrainDepthMm && place.z() > joint_z_mm + kBrainOverJointMm) {
-      marker[static_cast<size_t>(components.labels.values[index])] = kBrainMarker;
-    }
+    CoreParts& core = parts[static_cast<size_t>(components.labels.values[index])];
+    core.brain |= is_brain(index, place, kBrainOverJointMm);
+    core.face |=
+        place.y() < joint.y() - kFaceBeforeJointMm && place.z() < joint.z() - kFaceUnderJointMm;
   });
   LabelGrid markers(depth.geometry);
-  for (size_t i = 0; i < markers.values.size(); ++i) {
-    markers.values[i] = marker[static_cast<size_t>(components.labels.values[i])];
-  }
+  ForEachVoxel(cores, [&](size_t index, const Eigen::Vector3d& place) {
+    const CoreParts& core = parts[static_cast<size_t>(components.labels.values[index])];
+    uint8_t& marker = markers.values[index];
+    if (!core.brain || !core.face) {
+      marker = core.brain ? kBrainMarker : kFaceMarker;
+    } else if (is_brain(index, place, kSurelyBrainOverJointMm)) {
+      marker = kBrainMarker;
+    } else if (place.z() < joint.z() - kSkullBaseUnderJointMm) {
+      marker = kFaceMarker;
+    }
+  });
   return markers;
 }
 
@@ -73,13 +99,13 @@ LabelGrid BrainMarkers(const FloatGrid& depth, double neck_mm, double joint_z_mm
 // watershed of the depth parts them there. Closing the bone instead would take a ball as large as
 // the largest hole, and would close lips and eyelids with it; depth has its narrowest place in each
 // hole, whatever its size. Depths are in tenths of a mm, as the watershed floods whole numbers.
-LabelGrid WithoutBrain(const LabelGrid& soft, double neck_mm, double joint_z_mm) {
+LabelGrid WithoutBrain(const LabelGrid& soft, double neck_mm, const Eigen::Vector3d& joint) {
   const FloatGrid depth = SignedDistanceMm(soft);
   VoxelGrid<int16_t> height(soft.geometry);
   for (size_t i = 0; i < height.values.size(); ++i) {
     height.values[i] = static_cast<int16_t>(-std::lround(10 * std::min(depth.values[i], 1000.0F)));
   }
-  const LabelGrid markers = BrainMarkers(depth, neck_mm, joint_z_mm);
+  const LabelGrid markers = BrainMarkers(depth, neck_mm, joint);
   const LabelGrid parts = WatershedFromMarkers(height, markers, soft);
   return MaskWhere(parts, [](uint8_t part) { return part == kFaceMarker; });
 }
@@ -217,8 +243,9 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(
   TellStage(tell, "separating soft tissue from the brain", 0);
   const std::vector<Plane> planes = region.planes();
   const LabelGrid soft = SoftVoxels(head.head, bone_labels);
-  const double joint_z_mm = std::max(landmarks.condyle.left.z(), landmarks.condyle.right.z());
-  const LabelGrid face = WithoutBrain(soft, options.narrowest_neck_mm, joint_z_mm);
+  Eigen::Vector3d joint = (landmarks.condyle.left + landmarks.condyle.right) / 2;
+  joint.z() = std::max(landmarks.condyle.left.z(), landmarks.condyle.right.z());
+  const LabelGrid face = WithoutBrain(soft, options.narrowest_neck_mm, joint);
 
   TellStage(tell, "finding the outer skin", 0.45);
   LabelGrid outside_air = OutsideAir(head);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 
@@ -172,6 +173,15 @@ Mean Choose(const TetMeans& means, const Eigen::Vector3d& barycentre, const CtNu
   return tissue;
 }
 
+// Nothing where the CT decides.
+std::optional<int> KnownTissue(const LabelGrid* known, const Eigen::Vector3d& barycentre) {
+  if (known == nullptr || known->values.empty()) return std::nullopt;
+  const Eigen::Vector3i voxel = barycentre.array().round().cast<int>();
+  const uint8_t value = known->At(voxel.x(), voxel.y(), voxel.z());
+  if (value == 0) return std::nullopt;
+  return value - 1;
+}
+
 }  // namespace
 
 absl::StatusOr<TetStiffness> ComputeTetStiffness(const TetMesh& mesh, const HuGrid& hu,
@@ -189,7 +199,9 @@ absl::StatusOr<TetStiffness> ComputeTetStiffness(const TetMesh& mesh, const HuGr
     const int64_t mixed_before = result.from_mixed_voxels;
     const double mean_hu = Choose(of_tet, barycentre, numbers, &result).value();
     const bool mixed = result.from_mixed_voxels > mixed_before;
-    const int tissue = TissueOf(options.table, mean_hu);
+    const std::optional<int> known = KnownTissue(options.known_tissue, barycentre);
+    if (known) ++result.from_known_tissue;
+    const int tissue = known.value_or(TissueOf(options.table, mean_hu));
     result.mean_hu.push_back(mean_hu);
     result.voxels.push_back(
         static_cast<int32_t>(mixed ? of_tet.mixed.weight : of_tet.unmixed.weight));

@@ -17,6 +17,9 @@ namespace tissueform {
 struct TetStiffnessOptions {
   StiffnessTable table = DefaultStiffnessTable();
   double air_below_hu = -400;  // between fat (-190 and more) and air (-1000)
+  // On the CT's grid: 1 + place in the table where the tissue is known otherwise, 0 elsewhere. Null
+  // or without voxels: nowhere. The voxel of a tet's barycentre decides.
+  const LabelGrid* known_tissue = nullptr;
 };
 
 // One entry a tet, and how many tets got their CT number in which way.
@@ -30,6 +33,7 @@ struct TetStiffness {
   int64_t from_barycentre = 0;
   int64_t from_surroundings = 0;
   int64_t from_mixed_voxels = 0;
+  int64_t from_known_tissue = 0;  // of all of these: with a tissue that the CT did not decide
 };
 
 // Stiffness of each tet from the CT numbers in it: the mean over the voxels whose centres lie in it
@@ -46,6 +50,7 @@ struct TetStiffness {
 //   4. the mean of its mixed voxels, or, without any voxel, the interpolated value at its
 //   barycentre; but no less than air_below_hu, as air that skin was thickened into is tissue.
 //
+// REQUIRES: values of known_tissue are in the table.
 // Errors: InvalidArgument when the grids differ, when the table is wrong (CheckStiffnessTable), or
 // when a tet's barycentre lies outside the grid.
 absl::StatusOr<TetStiffness> ComputeTetStiffness(const TetMesh& mesh, const HuGrid& hu,

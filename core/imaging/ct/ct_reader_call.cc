@@ -74,6 +74,7 @@ void SendVolume(const absl::StatusOr<CtVolume>& volume, PipeSender* sender) {
   for (const Eigen::Vector3d& origin : volume->slice_origins_mm) {
     sender->Bytes(origin.data(), sizeof(origin));
   }
+  sender->Text(volume->frame_uid);
   SendProvenance(volume->provenance, sender);
   sender->Bytes(volume->hu.data(), volume->hu.size() * sizeof(int16_t));
 }
@@ -88,6 +89,7 @@ absl::StatusOr<CtVolume> ReceiveVolume(int descriptor, int64_t max_voxels) {
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.origin_mm.data(), sizeof(volume.origin_mm)));
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.direction.data(), sizeof(volume.direction)));
   TF_RETURN_IF_ERROR(ReceiveSliceOrigins(&receiver, &volume));
+  TF_ASSIGN_OR_RETURN(volume.frame_uid, receiver.Text());
   TF_RETURN_IF_ERROR(ReceiveProvenance(&receiver, &volume.provenance));
   volume.hu.resize(static_cast<size_t>(volume.num_voxels()));
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.hu.data(), volume.hu.size() * kVoxelBytes));

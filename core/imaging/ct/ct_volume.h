@@ -63,6 +63,10 @@ struct CtVolume {
 
   std::vector<int16_t> hu;  // i fastest; at least -1024
 
+  // DICOM's frame of reference, to compare with that of a label map; empty for other files. Never
+  // in a message or report.
+  std::string frame_uid;
+
   CtProvenance provenance;
 
   int64_t num_voxels() const { return int64_t{size[0]} * size[1] * size[2]; }

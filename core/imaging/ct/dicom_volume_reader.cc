@@ -168,6 +168,7 @@ absl::StatusOr<CtVolume> EmptyVolume(const DicomStack& stack, int64_t max_voxels
   volume.direction = stack.direction;
   volume.slice_origins_mm = stack.slice_origins_mm;
   volume.provenance.format = "DICOM";
+  volume.frame_uid = stack.slices.front().frame_uid;
   std::set<int> files;
   for (const DicomHeader& slice : stack.slices) files.insert(slice.file_number);
   volume.provenance.num_files = static_cast<int>(files.size());

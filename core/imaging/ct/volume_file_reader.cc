@@ -4,11 +4,12 @@
 #include "core/imaging/ct/volume_file_reader.h"
 
 #include <cmath>
-#include <itkImage.h>
 #include <itkImageFileReader.h>
+#include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
+#include <itkVectorImage.h>
 #include <optional>
 
 #include "absl/strings/ascii.h"
@@ -25,9 +26,8 @@
 namespace tissueform {
 namespace {
 
-using Image = itk::Image<float, 3>;
+using Image = itk::VectorImage<float, 3>;
 
-constexpr int kLeastVoxels = 8;
 constexpr double kLeastSpacingMm = 0.05;
 constexpr double kMaxSpacingMm = 10;
 
@@ -186,8 +186,13 @@ Orientation OrientationOf(VolumeFormat format, const VolumeHeader& header,
   return {};
 }
 
-absl::Status CheckShape(const itk::ImageIOBase& io, const CtReadLimits& limits) {
-  if (io.GetNumberOfComponents() > 1) {
+absl::Status CheckShape(const itk::ImageIOBase& io, const VolumeFileRules& rules) {
+  if (io.GetNumberOfComponents() > static_cast<unsigned>(rules.max_components)) {
+    if (rules.max_components > 1) {
+      return absl::ResourceExhaustedError(absl::StrCat("the file has ", io.GetNumberOfComponents(),
+                                                       " layers; at most ", rules.max_components,
+                                                       " are read"));
+    }
     return absl::InvalidArgumentError(absl::StrCat("the file holds ", io.GetNumberOfComponents(),
                                                    " numbers a voxel (colour or vectors); a CT "
                                                    "has one"));
@@ -198,19 +203,19 @@ absl::Status CheckShape(const itk::ImageIOBase& io, const CtReadLimits& limits) 
                                                      " volumes; extract the one to use"));
     }
   }
-  double voxels = 1;
+  double voxels = io.GetNumberOfComponents();
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto size = axis < io.GetNumberOfDimensions() ? io.GetDimensions(axis) : 1;
-    if (size < kLeastVoxels) {
-      return absl::InvalidArgumentError(absl::StrCat("the file has ", size,
-                                                     " voxels along its axis ", axis + 1,
-                                                     "; a volume needs at least ", kLeastVoxels));
+    if (size < static_cast<size_t>(rules.least_voxels)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("the file has ", size, " voxels along its axis ", axis + 1,
+                       "; a volume needs at least ", rules.least_voxels));
     }
     voxels *= static_cast<double>(size);
   }
-  if (voxels > static_cast<double>(limits.max_voxels)) {
+  if (voxels > static_cast<double>(rules.max_voxels)) {
     return absl::ResourceExhaustedError(absl::StrCat("the volume has ", voxels, " voxels; at most ",
-                                                     limits.max_voxels, " are read"));
+                                                     rules.max_voxels, " are read"));
   }
   return absl::OkStatus();
 }
@@ -250,27 +255,35 @@ absl::Status CheckGeometry(const CtVolume& volume, bool scaled) {
   return absl::OkStatus();
 }
 
-absl::Status TakeValues(const Image& image, double offset, CtVolume* volume) {
-  const auto count = static_cast<size_t>(volume->num_voxels());
-  const float* const values = image.GetBufferPointer();
-  volume->hu.resize(count);
-  for (size_t i = 0; i < count; ++i) {
-    if (!std::isfinite(values[i])) {
+absl::StatusOr<CtVolume> TakeHu(VolumeFileValues file, double offset) {
+  CtVolume volume = std::move(file.placed);
+  volume.hu.resize(file.values.size());
+  for (size_t i = 0; i < file.values.size(); ++i) {
+    if (!std::isfinite(file.values[i])) {
       return absl::InvalidArgumentError(
           absl::StrCat("voxel ", i, " is not a number; replace such voxels by air"));
     }
-    volume->hu[i] = ToHu(values[i] + offset);
+    volume.hu[i] = ToHu(file.values[i] + offset);
   }
-  return absl::OkStatus();
+  return volume;
 }
 
-absl::StatusOr<CtVolume> ReadWithItk(const std::string& path, VolumeFormat format,
-                                     const VolumeHeader& header, const FileContents& contents,
-                                     const CtReadOptions& options) {
+std::map<std::string, std::string> TextsOf(const itk::MetaDataDictionary& dictionary) {
+  std::map<std::string, std::string> texts;
+  for (const std::string& key : dictionary.GetKeys()) {
+    std::string value;
+    if (itk::ExposeMetaData(dictionary, key, value)) texts[key] = value;
+  }
+  return texts;
+}
+
+absl::Status ReadWithItk(const std::string& path, VolumeFormat format, const VolumeHeader& header,
+                         const FileContents& contents, const VolumeFileRules& rules,
+                         const std::function<absl::Status(VolumeFileValues)>& take) {
   const itk::ImageIOBase::Pointer io = MakeIo(format);
   io->SetFileName(path);
   io->ReadImageInformation();
-  TF_RETURN_IF_ERROR(CheckShape(*io, options.limits));
+  TF_RETURN_IF_ERROR(CheckShape(*io, rules));
   std::optional<NiftiHeader> nifti;
   if (format == VolumeFormat::kNifti) {
     nifti = ParseNiftiHeader(UnpackedStart(contents.file, kNiftiHeaderBytes));
@@ -280,29 +293,51 @@ absl::StatusOr<CtVolume> ReadWithItk(const std::string& path, VolumeFormat forma
   reader->SetImageIO(io);
   reader->SetFileName(path);
   reader->Update();
-  CtVolume volume;
+  const Image& image = *reader->GetOutput();
+  VolumeFileValues file;
+  CtVolume& volume = file.placed;
   volume.provenance = ProvenanceOf(format, header, contents);
-  TakeGeometry(*reader->GetOutput(), &volume);
+  TakeGeometry(image, &volume);
   if (nifti) TF_RETURN_IF_ERROR(CorrectGeometry(*nifti, *io, &volume));
   TF_RETURN_IF_ERROR(CheckGeometry(volume, nifti && nifti->NeedsScale()));
   const Orientation orientation = OrientationOf(format, header, nifti);
-  TF_RETURN_IF_ERROR(PlaceVolume(orientation.stated, orientation.where, options.axes, &volume));
-  TF_RETURN_IF_ERROR(TakeValues(*reader->GetOutput(), options.hu_offset.value_or(0), &volume));
-  return volume;
+  const std::string axes = orientation.stated && rules.spare_axes ? "" : rules.axes;
+  TF_RETURN_IF_ERROR(PlaceVolume(orientation.stated, orientation.where, axes, &volume));
+  file.components = static_cast<int>(image.GetNumberOfComponentsPerPixel());
+  file.values = {image.GetBufferPointer(),
+                 static_cast<size_t>(volume.num_voxels()) * static_cast<size_t>(file.components)};
+  file.texts = TextsOf(io->GetMetaDataDictionary());
+  return take(std::move(file));
 }
 
 }  // namespace
 
-absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat format,
-                                        const CtReadOptions& options) {
+absl::Status ReadVolumeFileValues(const std::string& path, VolumeFormat format,
+                                  const VolumeFileRules& rules,
+                                  const std::function<absl::Status(VolumeFileValues)>& take) {
   TF_ASSIGN_OR_RETURN(const VolumeHeader header, ReadVolumeHeader(path, format));
   TF_ASSIGN_OR_RETURN(const FileContents contents,
-                      ReadContents(path, header, options.limits.max_file_bytes));
+                      ReadContents(path, header, rules.max_file_bytes));
   try {
-    return ReadWithItk(path, format, header, contents, options);
+    return ReadWithItk(path, format, header, contents, rules, take);
   } catch (const itk::ExceptionObject& exception) {
     return ExplainFailure(exception);
   }
+}
+
+absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat format,
+                                        const CtReadOptions& options) {
+  absl::StatusOr<CtVolume> volume = Damaged();
+  TF_RETURN_IF_ERROR(ReadVolumeFileValues(path, format,
+                                          {.axes = options.axes,
+                                           .max_file_bytes = options.limits.max_file_bytes,
+                                           .max_voxels = options.limits.max_voxels},
+                                          [&](VolumeFileValues file) {
+                                            volume = TakeHu(std::move(file),
+                                                            options.hu_offset.value_or(0));
+                                            return volume.status();
+                                          }));
+  return volume;
 }
 
 }  // namespace tissueform

@@ -27,15 +27,20 @@ Kernel::Point_3 PointOf(const Positions& positions, Eigen::Index row) {
   return {positions(row, 0), positions(row, 1), positions(row, 2)};
 }
 
-}  // namespace
-
-Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
-                                   int threads) {
+Triangles TrianglesOf(const TriangleMesh& surface) {
   Triangles triangles;
   for (const auto& t : surface.triangles().rowwise()) {
     triangles.emplace_back(PointOf(surface.positions(), t[0]), PointOf(surface.positions(), t[1]),
                            PointOf(surface.positions(), t[2]));
   }
+  return triangles;
+}
+
+}  // namespace
+
+Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
+                                   int threads) {
+  const Triangles triangles = TrianglesOf(surface);
   Tree tree(triangles.begin(), triangles.end());
   tree.accelerate_distance_queries();
   Eigen::VectorXd distances(points.rows());
@@ -48,6 +53,30 @@ Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& 
     }
   });
   return distances;
+}
+
+struct NearestPoints::Search {
+  explicit Search(const TriangleMesh& surface)
+      : triangles(TrianglesOf(surface)), tree(triangles.begin(), triangles.end()) {
+    tree.accelerate_distance_queries();
+  }
+
+  Triangles triangles;
+  Tree tree;
+};
+
+NearestPoints::NearestPoints(const TriangleMesh& surface)
+    : search_(std::make_unique<const Search>(surface)) {}
+
+NearestPoints::~NearestPoints() = default;
+
+Positions NearestPoints::Of(const Positions& points) const {
+  Positions nearest(points.rows(), 3);
+  for (Eigen::Index p = 0; p < points.rows(); ++p) {
+    const Kernel::Point_3 at = search_->tree.closest_point(PointOf(points, p));
+    nearest.row(p) << at.x(), at.y(), at.z();
+  }
+  return nearest;
 }
 
 }  // namespace tissueform

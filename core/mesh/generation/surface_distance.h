@@ -3,6 +3,8 @@
 
 #pragma once
 
+#include <memory>
+
 #include "core/base/types.h"
 #include "core/mesh/triangle_mesh.h"
 
@@ -14,5 +16,24 @@ namespace tissueform {
 // REQUIRES: positions are finite.
 Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
                                    int threads = 1);
+
+// The points of one surface that are nearest to other points, by a search tree that is made once.
+// Not for several threads at a time.
+//
+// REQUIRES: positions are finite.
+class NearestPoints {
+ public:
+  explicit NearestPoints(const TriangleMesh& surface);
+  ~NearestPoints();
+  NearestPoints(const NearestPoints&) = delete;
+  NearestPoints& operator=(const NearestPoints&) = delete;
+
+  // For points (#P by 3), #P by 3.
+  Positions Of(const Positions& points) const;
+
+ private:
+  struct Search;
+  const std::unique_ptr<const Search> search_;
+};
 
 }  // namespace tissueform

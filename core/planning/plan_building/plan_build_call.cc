@@ -28,20 +28,26 @@ constexpr int64_t kFractionUnits = 1'000'000;
 
 void SendRequest(const PlanBuildRequest& request, PipeSender* to) {
   for (const std::string& text :
-       {request.ct, request.recipe, request.folder, request.folder_name}) {
+       {request.ct, request.recipe, request.surfaces, request.labels, request.folder,
+        request.folder_name}) {
     to->Text(text);
   }
   to->Number(request.threads);
   to->Number(request.pictures ? 1 : 0);
+  to->Number(request.only_compare_labels ? 1 : 0);
 }
 
 absl::StatusOr<PlanBuildRequest> ReceiveRequest(PipeReceiver* from) {
   PlanBuildRequest request;
-  for (std::string* text : {&request.ct, &request.recipe, &request.folder, &request.folder_name}) {
+  for (std::string* text :
+       {&request.ct, &request.recipe, &request.surfaces, &request.labels, &request.folder,
+        &request.folder_name}) {
     TF_ASSIGN_OR_RETURN(*text, from->Text());
   }
   TF_ASSIGN_OR_RETURN(const int64_t threads, from->Number(kMaxThreads));
   TF_ASSIGN_OR_RETURN(const int64_t pictures, from->Number(1));
+  TF_ASSIGN_OR_RETURN(const int64_t only_compare, from->Number(1));
+  request.only_compare_labels = only_compare != 0;
   request.threads = static_cast<int>(threads);
   request.pictures = pictures != 0;
   return request;

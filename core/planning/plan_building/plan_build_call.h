@@ -18,12 +18,15 @@ namespace tissueform {
 // A plan from a CT, made by the program tissueform-plan-build: neither a crash of ITK, CGAL or VTK
 // nor the memory that they take is the caller's, who links none of them.
 struct PlanBuildRequest {
-  std::string ct;           // file or folder, as BuildPlan takes it
-  std::string recipe;       // file
-  std::string folder;       // is there and empty; gets the plan and its report
-  std::string folder_name;  // what the answer calls it, for it may be renamed afterwards
-  int threads = 1;          // the plan does not depend on it
-  bool pictures = true;     // in the report: they need an X display or Xvfb
+  std::string ct;             // file or folder, as BuildPlan takes it
+  std::string recipe;         // file; may be empty where only labels are compared
+  std::string surfaces = {};  // file, instead of both, as BuildPlanFromSurfaces takes it
+  std::string labels = {};    // file of a label map; empty: that of the recipe, if it names one
+  bool only_compare_labels = false;  // no plan: the answer's text compares them with the CT
+  std::string folder;                // is there and empty; gets the plan and its report
+  std::string folder_name;           // what the answer calls it, for it may be renamed afterwards
+  int threads = 1;                   // the plan does not depend on it
+  bool pictures = true;              // in the report: they need an X display or Xvfb
   // As much as there is: how much a CT needs is not known before it is read.
   IsolationLimits limits = {.max_memory_bytes = std::numeric_limits<int64_t>::max(),
                             .max_seconds = std::numeric_limits<int>::max(),

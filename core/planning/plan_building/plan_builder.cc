@@ -13,6 +13,8 @@
 #include "core/imaging/anatomy/head_checks.h"
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/imaging/anatomy/surface_extraction.h"
+#include "core/planning/plan_building/surface_head.h"
+#include "core/planning/plan_building/surfaces_file.h"
 #include "core/planning/plan_building/trial_solve.h"
 #include "core/planning/plan_building/viewer_surfaces.h"
 
@@ -60,7 +62,8 @@ struct ResampledCt {
   CtProvenance provenance;
   std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
-  LabelGrid unscanned;  // core/imaging/ct/unscanned.h
+  std::string frame_uid;  // CtVolume::frame_uid
+  LabelGrid unscanned;    // core/imaging/ct/unscanned.h
   CtWithMetal ct;
 };
 
@@ -70,6 +73,20 @@ struct Anatomy {
   Landmarks landmarks;
   std::optional<FrankfortLandmarks> frankfort;
   HeadFrame frame;
+  LabelGrid known_tissue;  // PlanLabels::tissue
+};
+
+// What CT and surfaces lead to alike, and from which a plan is built.
+struct Source {
+  CtProvenance provenance;
+  std::array<int, 3> size = {0, 0, 0};
+  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
+  MetalReport metal;
+  HuGrid before_correction;
+  Anatomy anatomy;
+  std::optional<PlanLabels> labels;
+  std::optional<LabelGrid> tissue_class;  // what the stiffness goes by, where it is not HU
+  std::optional<LabelGrid> segments;      // where they are not cut: as DividedBone::labels
 };
 
 struct DividedBone {
@@ -92,6 +109,7 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
   ResampledCt result{.provenance = std::move(volume.provenance),
                      .size = volume.size,
                      .spacing_mm = volume.spacing_mm,
+                     .frame_uid = volume.frame_uid,
                      .unscanned = {},
                      .ct = {}};
   TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
@@ -100,14 +118,48 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
   return result;
 }
 
-absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
-                                    const Recipe& recipe, Progress* progress) {
+absl::StatusOr<Anatomy> WithFrame(HeadSegmentation head, BoneParts parts,
+                                  const Landmarks& landmarks, const Recipe& recipe) {
+  const std::optional<FrankfortLandmarks> frankfort =
+      FindFrankfort(head.hu, head.options.bone_above_hu, landmarks);
+  TF_ASSIGN_OR_RETURN(HeadFrame frame, ChooseHeadFrame({.landmarks = landmarks,
+                                                        .frankfort = frankfort,
+                                                        .given_midsagittal = recipe.midsagittal,
+                                                        .given_horizontal = recipe.horizontal}));
+  return Anatomy{.head = std::move(head),
+                 .parts = std::move(parts),
+                 .landmarks = landmarks,
+                 .frankfort = frankfort,
+                 .frame = std::move(frame),
+                 .known_tissue = {}};
+}
+
+struct HeadAndBone {
+  HeadSegmentation head;
+  absl::StatusOr<BoneParts> parts;  // an error where the jaws cannot be separated
+};
+
+// `labels` may be empty; gets the comparison with what the image alone shows.
+absl::StatusOr<HeadAndBone> SegmentBone(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                        const Recipe& recipe, std::optional<PlanLabels>* labels,
+                                        Progress* progress) {
   progress->Begin("finding head and bone", 0.12, 0.3);
   TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct.hu, recipe.segmentation,
                                                          progress->Parts(), ct.metal, unscanned));
   progress->Begin("separating bones", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
+  if (labels->has_value())
+    parts = SeparateByLabels(std::move(parts), recipe.tissues, &head, &**labels);
+  return HeadAndBone{std::move(head), std::move(parts)};
+}
+
+absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
+                                    const Recipe& recipe, std::optional<PlanLabels>* labels,
+                                    Progress* progress) {
+  TF_ASSIGN_OR_RETURN(HeadAndBone bone, SegmentBone(ct, unscanned, recipe, labels, progress));
+  HeadSegmentation& head = bone.head;
+  absl::StatusOr<BoneParts>& parts = bone.parts;
   const bool plane_given = recipe.occlusal_plane.has_value();
   if (!parts.ok()) return ExplainMissingAnatomy(head, plane_given, parts.status());
   progress->Begin("finding landmarks", 0.42, 0.46);
@@ -115,17 +167,19 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unsc
   const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
   if (!found.ok()) return ExplainMissingAnatomy(head, plane_given, found);
   TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
-  const std::optional<FrankfortLandmarks> frankfort =
-      FindFrankfort(head.hu, head.options.bone_above_hu, *landmarks);
-  TF_ASSIGN_OR_RETURN(HeadFrame frame, ChooseHeadFrame({.landmarks = *landmarks,
-                                                        .frankfort = frankfort,
-                                                        .given_midsagittal = recipe.midsagittal,
-                                                        .given_horizontal = recipe.horizontal}));
-  return Anatomy{.head = std::move(head),
-                 .parts = *std::move(parts),
-                 .landmarks = *landmarks,
-                 .frankfort = frankfort,
-                 .frame = std::move(frame)};
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy,
+                      WithFrame(std::move(head), *std::move(parts), *landmarks, recipe));
+  if (labels->has_value()) anatomy.known_tissue = std::move((*labels)->tissue);
+  return anatomy;
+}
+
+// Surfaces tell the bones apart: only the landmarks are found.
+absl::StatusOr<Anatomy> FindAnatomyOfSurfaces(SurfaceHead made, const Recipe& recipe,
+                                              Progress* progress) {
+  progress->Begin("finding landmarks", 0.42, 0.46);
+  const absl::StatusOr<Landmarks> landmarks = FindLandmarks(made.head, made.parts);
+  TF_RETURN_IF_ERROR(landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status());
+  return WithFrame(std::move(made.head), std::move(made.parts), *landmarks, recipe);
 }
 
 absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {
@@ -155,18 +209,35 @@ absl::StatusOr<BuiltSegment> BuildSegment(const LabelGrid& bone, uint8_t label,
                       .surface = std::move(surface)};
 }
 
-absl::StatusOr<DividedBone> CutBone(const Anatomy& anatomy,
-                                    const std::vector<RecipeSegment>& planned, Progress* progress) {
-  progress->Begin("cutting the bone", 0.46, 0.5);
+std::vector<OsteotomySegment> CutsOf(const std::vector<RecipeSegment>& planned,
+                                     const Landmarks& landmarks) {
   std::vector<OsteotomySegment> cuts;
   cuts.reserve(planned.size());
   for (const RecipeSegment& segment : planned) {
     cuts.push_back(segment.planes.empty()
-                       ? DefaultSegment(segment.kind, segment.name, anatomy.landmarks)
+                       ? DefaultSegment(segment.kind, segment.name, landmarks)
                        : OsteotomySegment{segment.name, segment.kind, segment.planes});
   }
+  return cuts;
+}
+
+// Segments that were given as a whole have no planes.
+std::vector<OsteotomySegment> WithoutPlanes(std::vector<OsteotomySegment> cuts) {
+  for (OsteotomySegment& cut : cuts) cut.planes.clear();
+  return cuts;
+}
+
+absl::StatusOr<DividedBone> CutBone(const Anatomy& anatomy, std::optional<LabelGrid> given,
+                                    const std::vector<RecipeSegment>& planned, Progress* progress) {
+  progress->Begin("cutting the bone", 0.46, 0.5);
+  std::vector<OsteotomySegment> cuts = CutsOf(planned, anatomy.landmarks);
   DividedBone divided;
-  TF_ASSIGN_OR_RETURN(divided.labels, CutSegments(anatomy.parts.labels, cuts));
+  if (given) {
+    divided.labels = *std::move(given);
+    cuts = WithoutPlanes(std::move(cuts));
+  } else {
+    TF_ASSIGN_OR_RETURN(divided.labels, CutSegments(anatomy.parts.labels, cuts));
+  }
   for (size_t s = 0; s < cuts.size(); ++s) {
     TF_ASSIGN_OR_RETURN(BuiltSegment segment,
                         BuildSegment(divided.labels, static_cast<uint8_t>(kFirstSegment + s),
@@ -234,15 +305,23 @@ double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
   return std::max(kBandVoxels * recipe.spacing_mm, kBandOfMove * largest_move_mm);
 }
 
+absl::StatusOr<TetStiffness> Stiffness(const TetMesh& mesh, const Source& source,
+                                       const StiffnessTable& table) {
+  if (source.tissue_class) return StiffnessByClass(mesh, *source.tissue_class, table);
+  const HeadSegmentation& head = source.anatomy.head;
+  return ComputeTetStiffness(mesh, head.hu, head.bone,
+                             {.table = table, .known_tissue = &source.anatomy.known_tissue});
+}
+
 // What the tets are made of and what holds the vertices.
 absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTissue& soft_tissue,
-                                     const Anatomy& anatomy,
+                                     const Source& source,
                                      const std::vector<BuiltSegment>& segments,
                                      const Recipe& recipe, int threads, Progress* progress) {
   progress->Begin("assigning stiffness and regions", 0.9, 0.96);
+  const Anatomy& anatomy = source.anatomy;
   const HeadSegmentation& head = anatomy.head;
-  TF_ASSIGN_OR_RETURN(TetStiffness stiffness, ComputeTetStiffness(built.mesh, head.hu, head.bone,
-                                                                  {.table = recipe.tissues}));
+  TF_ASSIGN_OR_RETURN(TetStiffness stiffness, Stiffness(built.mesh, source, recipe.tissues));
   std::vector<HandlePose> poses;
   poses.reserve(segments.size());
   for (const BuiltSegment& segment : segments) poses.push_back(segment.pose);
@@ -267,6 +346,48 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
                      .skin_distance = std::move(skin_distance)};
 }
 
+absl::StatusOr<Source> SourceOfCt(const std::string& path, const Recipe& recipe, int threads,
+                                  Progress* progress) {
+  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(path, recipe, threads, progress));
+  if (!recipe.labels.file.empty()) progress->Begin("reading the label map", 0.12, 0.12);
+  TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
+                      ReadPlanLabels(recipe, ct.frame_uid, threads, &ct.ct.hu));
+  // The head has HU of its own, as large as the CT's; the next stages need the room.
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, &labels, progress));
+  return Source{.provenance = std::move(ct.provenance),
+                .size = ct.size,
+                .spacing_mm = ct.spacing_mm,
+                .metal = std::move(ct.ct.report),
+                .before_correction = std::move(ct.ct.before),
+                .anatomy = std::move(anatomy),
+                .labels = std::move(labels),
+                .tissue_class = {},
+                .segments = {}};
+}
+
+absl::StatusOr<Source> SourceOfSurfaces(SurfacesInput input, int threads, Progress* progress) {
+  progress->Begin("filling the surfaces with voxels", 0.12, 0.42);
+  TF_ASSIGN_OR_RETURN(
+      SurfaceHead made,
+      MakeHeadFromSurfaces(input.surfaces, input.recipe.spacing_mm, threads, progress->Parts()));
+  std::vector<std::string>& notes = input.provenance.notes;
+  notes.insert(notes.end(), made.notes.begin(), made.notes.end());
+  std::optional<LabelGrid> segments = std::move(made.segments);
+  std::optional<LabelGrid> tissue_class = std::move(made.tissue_class);
+  const GridGeometry geometry = made.head.hu.geometry;
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy,
+                      FindAnatomyOfSurfaces(std::move(made), input.recipe, progress));
+  return Source{.provenance = std::move(input.provenance),
+                .size = geometry.size,
+                .spacing_mm = Eigen::Vector3d::Constant(geometry.spacing_mm),
+                .metal = {},
+                .before_correction = {},
+                .anatomy = std::move(anatomy),
+                .labels = {},
+                .tissue_class = std::move(tissue_class),
+                .segments = std::move(segments)};
+}
+
 }  // namespace
 
 std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
@@ -276,28 +397,40 @@ std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
   return names;
 }
 
-absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
-                                    const PlanBuildOptions& options) {
+absl::StatusOr<PlanLabels> CompareWithLabels(const std::string& ct_path, const Recipe& recipe,
+                                             const PlanBuildOptions& options) {
   Progress progress(options.tell);
   SetFilterThreads(options.threads);
   TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
-  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, &progress));
-  ct.unscanned = {};
-  ct.ct.hu = {};  // the head has its own: as large as the CT, and the next stages need the room
-  TF_ASSIGN_OR_RETURN(DividedBone bone, CutBone(anatomy, recipe.segments, &progress));
+  TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
+                      ReadPlanLabels(recipe, ct.frame_uid, options.threads, &ct.ct.hu));
+  if (!labels) return absl::InvalidArgumentError("no label map is named; use --labels");
+  TF_ASSIGN_OR_RETURN(const HeadAndBone bone,
+                      SegmentBone(ct.ct, ct.unscanned, recipe, &labels, &progress));
+  TF_RETURN_IF_ERROR(bone.parts.status());
+  return *std::move(labels);
+}
+
+namespace {
+
+absl::StatusOr<PlanBuild> BuildFromSource(Source source, const Recipe& recipe,
+                                          const PlanBuildOptions& options, Progress& progress) {
+  Anatomy& anatomy = source.anatomy;
+  TF_ASSIGN_OR_RETURN(DividedBone bone,
+                      CutBone(anatomy, std::move(source.segments), recipe.segments, &progress));
   TF_ASSIGN_OR_RETURN(SoftTissue soft_tissue,
                       FindSoftTissue(anatomy, bone.labels, recipe, &progress));
   TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh,
                       Mesh(soft_tissue, anatomy.landmarks, recipe, options.threads, &progress));
   TF_ASSIGN_OR_RETURN(const std::optional<SeamInMesh> seam, MakeSeam(anatomy, recipe, &mesh));
-  TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, anatomy, bone.segments,
+  TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, source, bone.segments,
                                                         recipe, options.threads, &progress));
   progress.Begin("comparing the mesh with the CT's skin", 0.96, 0.98);
   TF_ASSIGN_OR_RETURN(SkinCoverage coverage,
                       MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
                                           {mesh.surface, description.released.regions,
                                            soft_tissue.region, &soft_tissue.outside_air},
-                                          ct.spacing_mm.maxCoeff(), options.threads));
+                                          source.spacing_mm.maxCoeff(), options.threads));
   std::optional<PartedLips> lips;
   if (seam) {
     TF_ASSIGN_OR_RETURN(lips, PartLips(*seam,
@@ -315,15 +448,15 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                                           .bone = bone.labels,
                                           .landmarks = anatomy.landmarks,
                                           .segments = NamesOf(bone.segments),
-                                          .ct_voxel_mm = ct.spacing_mm.maxCoeff()}));
+                                          .ct_voxel_mm = source.spacing_mm.maxCoeff()}));
   soft_tissue.outside_air = {};  // as large as the CT's grid, and not asked for any more
   TellStage(options.tell, "done", 1);
   return PlanBuild{.recipe = recipe,
-                   .ct = std::move(ct.provenance),
-                   .ct_size = ct.size,
-                   .ct_spacing_mm = ct.spacing_mm,
-                   .metal = std::move(ct.ct.report),
-                   .before_correction = std::move(ct.ct.before),
+                   .ct = std::move(source.provenance),
+                   .ct_size = source.size,
+                   .ct_spacing_mm = source.spacing_mm,
+                   .metal = std::move(source.metal),
+                   .before_correction = std::move(source.before_correction),
                    .head = std::move(anatomy.head),
                    .parts = std::move(anatomy.parts),
                    .bone = std::move(bone.labels),
@@ -338,10 +471,33 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                    .num_inverted = description.released.num_inverted,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage),
+                   .labels = std::move(source.labels),
                    .lips = std::move(lips),
                    .frankfort = anatomy.frankfort,
                    .head_frame = std::move(anatomy.frame),
                    .viewer_surfaces = std::move(viewer_surfaces)};
+}
+
+}  // namespace
+
+absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
+                                    const PlanBuildOptions& options) {
+  Progress progress(options.tell);
+  SetFilterThreads(options.threads);
+  TF_ASSIGN_OR_RETURN(Source source, SourceOfCt(ct_path, recipe, options.threads, &progress));
+  return BuildFromSource(std::move(source), recipe, options, progress);
+}
+
+absl::StatusOr<PlanBuild> BuildPlanFromSurfaces(const std::string& path,
+                                                const PlanBuildOptions& options) {
+  Progress progress(options.tell);
+  SetFilterThreads(options.threads);
+  progress.Begin("reading the surfaces", 0, 0.12);
+  TF_ASSIGN_OR_RETURN(SurfacesInput input, ReadSurfaces(path, options.threads));
+  const Recipe recipe = input.recipe;
+  TF_ASSIGN_OR_RETURN(Source source,
+                      SourceOfSurfaces(std::move(input), options.threads, &progress));
+  return BuildFromSource(std::move(source), recipe, options, progress);
 }
 
 }  // namespace tissueform

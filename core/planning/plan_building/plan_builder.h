@@ -25,6 +25,7 @@
 #include "core/planning/case_file/case_file.h"
 #include "core/planning/plan_building/frankfort.h"
 #include "core/planning/plan_building/lip_parting.h"
+#include "core/planning/plan_building/plan_labels.h"
 #include "core/planning/plan_building/planning_regions.h"
 #include "core/planning/plan_building/recipe.h"
 #include "core/planning/plan_building/skin_coverage.h"
@@ -70,6 +71,7 @@ struct PlanBuild {
   int64_t num_inverted = 0;           // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
+  std::optional<PlanLabels> labels = {};             // where the recipe names a label map
   std::optional<PartedLips> lips = {};               // where the recipe parts them
   std::optional<FrankfortLandmarks> frankfort = {};  // where they were found
   HeadFrame head_frame = {};
@@ -88,6 +90,17 @@ struct PlanBuildOptions {
 // of which says what it found and what to do.
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options = {});
+
+// The same from a surfaces file (surfaces_file.h), without a CT: the grids of the result are made
+// from the surfaces, and its recipe is what the file says besides.
+//
+// Errors: those of ReadSurfaces and MakeHeadFromSurfaces, and those of the later stages.
+absl::StatusOr<PlanBuild> BuildPlanFromSurfaces(const std::string& path,
+                                                const PlanBuildOptions& options = {});
+// How far the recipe's label map and our own segmentation agree, without a plan. Errors: those of
+// BuildPlan up to the separation of the jaws; InvalidArgument where the recipe has no label map.
+absl::StatusOr<PlanLabels> CompareWithLabels(const std::string& ct_path, const Recipe& recipe,
+                                             const PlanBuildOptions& options = {});
 
 // Writes into the folder, which exists:
 //   plan.json           the plan (docs/plan-format.md)

@@ -61,6 +61,27 @@ CtReadOptions ToCtOptions(const Json& json) {
   return options;
 }
 
+absl::StatusOr<RecipeLabels> ToLabels(const Json& json) {
+  RecipeLabels labels;
+  labels.file = json.value("file", "");
+  labels.convention = json.value("convention", "");
+  const Json all_names = json.value("names", Json::object());
+  for (const auto& [key, names] : all_names.items()) {
+    const std::optional<Structure> structure = StructureOfKey(key);
+    if (!structure) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("unknown structure at /labels/names; use ", StructureKeys()));
+    }
+    for (const Json& name : names) {
+      LabelRule rule{.structure = *structure, .name = {}, .value = {}};
+      if (name.is_string()) rule.name = name.get<std::string>();
+      if (name.is_number()) rule.value = name.get<int>();
+      labels.names.push_back(std::move(rule));
+    }
+  }
+  return labels;
+}
+
 MetalOptions ToMetal(const Json& json) {
   MetalOptions options;
   options.correct = json != "off";
@@ -177,6 +198,7 @@ absl::StatusOr<Recipe> ToRecipe(const Json& json) {
   const Json nothing = Json::object();
   Recipe recipe;
   recipe.ct = ToCtOptions(json.value("ct", nothing));
+  TF_ASSIGN_OR_RETURN(recipe.labels, ToLabels(json.value("labels", nothing)));
   recipe.spacing_mm = json.value("spacing_mm", recipe.spacing_mm);
   recipe.metal = ToMetal(json.value("metal", Json("auto")));
   recipe.segmentation = ToSegmentation(json.value("segmentation", nothing));
@@ -219,6 +241,17 @@ Json CtToJson(const CtReadOptions& options) {
   if (options.series_number) json["series_number"] = *options.series_number;
   if (options.join_series != JoinSeries::kAuto) {
     json["join_series"] = options.join_series == JoinSeries::kAlways ? "always" : "never";
+  }
+  return json;
+}
+
+// Without the file: its name may hold a patient's, and the report has its SHA-256.
+Json LabelsToJson(const RecipeLabels& labels) {
+  Json json = Json::object();
+  if (!labels.convention.empty()) json["convention"] = labels.convention;
+  for (const LabelRule& rule : labels.names) {
+    json["names"][std::string(StructureKey(rule.structure))].push_back(
+        rule.value ? Json(*rule.value) : Json(rule.name));
   }
   return json;
 }
@@ -267,7 +300,10 @@ absl::StatusOr<Recipe> ReadRecipe(const std::string& path) {
     return absl::PermissionDeniedError(
         absl::StrCat("cannot read recipe ", path, "; check its permissions"));
   }
-  return ParseRecipe(text, path);
+  TF_ASSIGN_OR_RETURN(Recipe recipe, ParseRecipe(text, path));
+  std::string& labels = recipe.labels.file;
+  if (!labels.empty()) labels = (std::filesystem::path(path).parent_path() / labels).string();
+  return recipe;
 }
 
 absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name) {
@@ -317,6 +353,7 @@ std::string RecipeToJson(const Recipe& recipe) {
   if (json["head_frame"].is_null()) json.erase("head_frame");
   if (recipe.contact_band_mm) json["contact_band_mm"] = *recipe.contact_band_mm;
   // Only where it is not the default, so that a recipe of version 1 stays one.
+  if (!recipe.labels.file.empty()) json["labels"] = LabelsToJson(recipe.labels);
   if (!recipe.metal.correct) json["metal"] = "off";
   if (recipe.lips.part) json["lips"] = LipsToJson(recipe.lips);
   if (recipe.metal.threshold_hu) json["metal"] = *recipe.metal.threshold_hu;

@@ -16,6 +16,7 @@
 #include "core/imaging/anatomy/soft_tissue.h"
 #include "core/imaging/anatomy/stiffness_table.h"
 #include "core/imaging/ct/ct_volume_reader.h"
+#include "core/imaging/labels/label_map.h"
 #include "core/imaging/metal/metal_reduction.h"
 #include "core/mechanics/constraints/handle_pose.h"
 #include "core/mechanics/deformation/model.h"
@@ -44,11 +45,19 @@ struct RecipeLips {
   double vestibule_mm = 10;  // so far from the mouth line tissue slides on the jaws
 };
 
+// A label map that says what thresholds would have to find.
+struct RecipeLabels {
+  std::string file;  // empty: none
+  std::vector<LabelRule> names;
+  std::string convention;  // LabelReadOptions::convention
+};
+
 // How a planning model is made from a CT of a head (docs/recipe-format.md). Coordinates are LPS,
 // mm.
 struct Recipe {
   std::string sha256;  // of the text that was parsed; empty for a recipe that was not read
   CtReadOptions ct;
+  RecipeLabels labels;
   MetalOptions metal;
   double spacing_mm = 1.5;
   HeadSegmentationOptions segmentation;

@@ -32,6 +32,10 @@ const char* SeparationText(JawSeparation separation) {
       return "the teeth do not touch: at marker_hu the mandible is a separate component";
     case JawSeparation::kAutomaticCut:
       return "the teeth touch: separated by the plane between them with the best clearance";
+    case JawSeparation::kGiven:
+      return "skull and lower jaw were given apart";
+    case JawSeparation::kLabels:
+      return "by the label map";
     case JawSeparation::kGivenCut:
       break;
   }
@@ -135,12 +139,15 @@ Json SegmentsJson(const PlanBuild& build) {
   for (size_t s = 0; s < build.segments.size(); ++s) {
     const BuiltSegment& segment = build.segments[s];
     const bool given = !build.recipe.segments[s].planes.empty();
+    const bool cut = !segment.cut.planes.empty();
     segments.push_back({{"name", segment.cut.name},
                         {"osteotomy", std::string(OsteotomyKindName(segment.cut.kind))},
                         {"volume_mm3", segment.volume_mm3},
                         {"pose", ToJson(segment.pose)},
                         {"largest_move_mm", segment.largest_move_mm},
-                        {"planes_from", given ? "recipe" : "anatomy"},
+                        {"planes_from", given ? "recipe"
+                                        : cut ? "anatomy"
+                                              : "surface"},
                         {"planes", PlanesJson(segment.cut.planes)}});
   }
   return segments;

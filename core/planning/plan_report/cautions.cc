@@ -8,6 +8,7 @@
 #include "absl/strings/str_format.h"
 
 #include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/labels_report.h"
 #include "core/planning/plan_report/lips_report.h"
 #include "core/planning/plan_report/metal_report.h"
 #include "core/planning/plan_report/objects_report.h"
@@ -37,6 +38,7 @@ std::vector<std::string> Cautions(const PlanBuild& build) {
   for (std::string& caution : CutCautions(build.coverage)) cautions.push_back(std::move(caution));
   for (std::string& caution : ObjectsCautions(build)) cautions.push_back(std::move(caution));
   for (std::string& caution : MetalCautions(build)) cautions.push_back(std::move(caution));
+  for (std::string& caution : LabelsCautions(build.labels)) cautions.push_back(std::move(caution));
   for (std::string& caution : MouthCautions(build)) cautions.push_back(std::move(caution));
   const double nose_mm = build.landmarks.nose_prominence_mm;
   if (NoseIsCut(build.coverage)) {

@@ -67,6 +67,26 @@ absl::StatusOr<ReportPicture> DrawSlices(const PlanBuild& build, const std::stri
   return picture;
 }
 
+absl::StatusOr<ReportPicture> DrawLabels(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{
+      "labels.png",
+      "Where the label map and the CT disagree on bone",
+      "The slices of the picture above. Marrow, pulp and thin walls are labelled as bone and not "
+      "dense in the CT. Within a voxel of a label's border the CT decides, elsewhere the label.",
+      {{"only in the labels", DifferenceColour(kOnlyInLabels)},
+       {"dense in the CT, not labelled", DifferenceColour(kOnlyInImage)},
+       {"labelled as another bone", DifferenceColour(kOtherBone)}}};
+  std::vector<Picture> panels;
+  for (const SlicePlane& plane : PlanSlices(build.landmarks)) {
+    panels.push_back(DrawLabelDifference(build, plane));
+  }
+  Figure figure(picture.title);
+  figure.AddRow(640, {panels[0], panels[1]});
+  figure.AddRow(640, {panels[2], panels[3]});
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
 absl::StatusOr<ReportPicture> DrawMetal(const PlanBuild& build, const std::string& folder) {
   ReportPicture picture{
       "metal.png",
@@ -219,6 +239,10 @@ absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& bui
        {DrawSlices, DrawBone, DrawSkin, DrawCoverage, DrawConstraints, DrawTets}) {
     TF_ASSIGN_OR_RETURN(ReportPicture picture, draw(build, folder));
     pictures.push_back(std::move(picture));
+  }
+  if (build.labels) {
+    TF_ASSIGN_OR_RETURN(ReportPicture labels, DrawLabels(build, folder));
+    pictures.insert(pictures.begin() + 1, std::move(labels));
   }
   if (mouth.ok()) {
     TF_ASSIGN_OR_RETURN(ReportPicture line, DrawMouth(build, *mouth, folder));

@@ -191,6 +191,15 @@ std::string MetalSection(const Json& report) {
   return Section("Metal", JsonTable(rest) + JsonColumns(metal["pieces"]));
 }
 
+std::string LabelsSection(const Json& report) {
+  const Json labels = report.value("labels", Json());
+  if (!labels.is_object()) return "";
+  Json rest = labels;
+  for (const char* const key : {"agreement", "segments"}) rest.erase(key);
+  return Section("Label map", JsonColumns(labels["agreement"]) + JsonTable(rest) +
+                                  JsonColumns(labels["segments"]));
+}
+
 // The sentences; the points are for programs.
 std::string MouthSection(const Json& report) {
   std::string texts;
@@ -206,8 +215,8 @@ std::string MouthSection(const Json& report) {
 std::string Tables(const Json& report) {
   return absl::StrCat(
       Section("Segments", SegmentTables(report["segments"])),
-      Section("Bone and its separation", JsonTable(report["bone"])), MetalSection(report),
-      MouthSection(report), Section("Mesh", JsonTable(report["mesh"])),
+      Section("Bone and its separation", JsonTable(report["bone"])), LabelsSection(report),
+      MetalSection(report), MouthSection(report), Section("Mesh", JsonTable(report["mesh"])),
       Section("Distances", JsonTable(report["distances"])),
       Section("The CT's skin in the mesh", JsonTable(report["coverage"])),
       Section("Stiffness", StiffnessHtml(report["stiffness"])),

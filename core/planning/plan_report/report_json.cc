@@ -13,6 +13,7 @@
 #include "core/planning/plan_report/anatomy_json.h"
 #include "core/planning/plan_report/cautions.h"
 #include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/labels_report.h"
 #include "core/planning/plan_report/library_versions.h"
 #include "core/planning/plan_report/lips_report.h"
 #include "core/planning/plan_report/metal_report.h"
@@ -108,7 +109,8 @@ Json StiffnessJson(const PlanBuild& build, const PlanMeasures& measures) {
           {"tets_from_voxels", build.stiffness.from_voxels},
           {"tets_from_barycentre", build.stiffness.from_barycentre},
           {"tets_from_surroundings", build.stiffness.from_surroundings},
-          {"tets_from_mixed_voxels", build.stiffness.from_mixed_voxels}};
+          {"tets_from_mixed_voxels", build.stiffness.from_mixed_voxels},
+          {"tets_from_labels", build.stiffness.from_known_tissue}};
 }
 
 int64_t CountOf(const std::vector<uint8_t>& labels, size_t label) {
@@ -173,6 +175,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"program", ProgramJson(program_version)},
           {"input", InputJson(build)},
           {"metal", MetalJson(build)},
+          {"labels", LabelsJson(build.labels)},
           {"head", HeadJson(build)},
           {"bone", BoneJson(build, measures)},
           {"landmarks", LandmarksJson(build)},

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "core/imaging/anatomy/grid_operations.h"
@@ -19,6 +20,8 @@ constexpr double kWhiteHu = 900;
 constexpr double kTint = 0.3;  // of what is labelled; outlines have the full colour
 
 using Eigen::Vector3d;
+
+using LabelFunction = std::function<uint8_t(const Vector3d& place_mm)>;
 
 // Where a picture's pixels lie: origin + pixel_mm * (column * right + row * down).
 struct PixelGrid {
@@ -67,14 +70,14 @@ Colour ColourOfLabel(uint8_t label) {
 }
 
 // The labels of all pixels, row by row.
-std::vector<uint8_t> SampleLabels(const PlanBuild& build, const SlicePlane& plane,
+std::vector<uint8_t> SampleLabels(const LabelFunction& label_at, const SlicePlane& plane,
                                   const PixelGrid& pixels) {
   std::vector<uint8_t> labels;
   labels.reserve(static_cast<size_t>(pixels.width) * static_cast<size_t>(pixels.height));
   for (int row = 0; row < pixels.height; ++row) {
     for (int column = 0; column < pixels.width; ++column) {
       labels.push_back(
-          LabelAt(build, pixels.origin_mm + kPixelMm * (column * plane.right + row * plane.down)));
+          label_at(pixels.origin_mm + kPixelMm * (column * plane.right + row * plane.down)));
     }
   }
   return labels;
@@ -112,6 +115,31 @@ void Append(const Colour& colour, Picture* picture) {
   }
 }
 
+// The CT in grey with labels in their colors, over the whole extent of its grid.
+Picture DrawLabelled(const HuGrid& hu, const LabelFunction& label_at, Colour (*colour_of)(uint8_t),
+                     const SlicePlane& plane) {
+  const PixelGrid pixels = PixelsOver(hu.geometry, plane);
+  const std::vector<uint8_t> labels = SampleLabels(label_at, plane, pixels);
+  Picture picture = EmptyPicture(plane, pixels);
+  picture.rgb.reserve(3 * labels.size());
+  size_t pixel = 0;
+  for (int row = 0; row < pixels.height; ++row) {
+    for (int column = 0; column < pixels.width; ++column, ++pixel) {
+      Colour colour =
+          Grey(hu, pixels.origin_mm + kPixelMm * (column * plane.right + row * plane.down));
+      if (const uint8_t label = labels[pixel]; label != 0) {
+        const bool outline =
+            (column > 0 && labels[pixel - 1] != label) ||
+            (row > 0 && labels[pixel - static_cast<size_t>(pixels.width)] != label);
+        const double tint = outline ? 1 : kTint;
+        colour = (1 - tint) * colour + tint * colour_of(label);
+      }
+      Append(colour, &picture);
+    }
+  }
+  return picture;
+}
+
 }  // namespace
 
 SlicePlane AxialSlice(const std::string& title, const Vector3d& through_mm) {
@@ -142,26 +170,22 @@ Picture DrawPlainSlice(const HuGrid& hu, const GridGeometry& over, const SlicePl
 }
 
 Picture DrawSlice(const PlanBuild& build, const SlicePlane& plane) {
-  const PixelGrid pixels = PixelsOver(build.head.hu.geometry, plane);
-  const std::vector<uint8_t> labels = SampleLabels(build, plane, pixels);
-  Picture picture = EmptyPicture(plane, pixels);
-  picture.rgb.reserve(3 * labels.size());
-  size_t pixel = 0;
-  for (int row = 0; row < pixels.height; ++row) {
-    for (int column = 0; column < pixels.width; ++column, ++pixel) {
-      Colour colour = Grey(build.head.hu,
-                           pixels.origin_mm + kPixelMm * (column * plane.right + row * plane.down));
-      if (const uint8_t label = labels[pixel]; label != 0) {
-        const bool outline =
-            (column > 0 && labels[pixel - 1] != label) ||
-            (row > 0 && labels[pixel - static_cast<size_t>(pixels.width)] != label);
-        const double tint = outline ? 1 : kTint;
-        colour = (1 - tint) * colour + tint * ColourOfLabel(label);
-      }
-      Append(colour, &picture);
-    }
-  }
-  return picture;
+  return DrawLabelled(
+      build.head.hu, [&build](const Vector3d& place_mm) { return LabelAt(build, place_mm); },
+      ColourOfLabel, plane);
+}
+
+Picture DrawLabelDifference(const PlanBuild& build, const SlicePlane& plane) {
+  const LabelGrid& difference = build.labels->agreement.difference;
+  return DrawLabelled(
+      build.head.hu,
+      [&difference](const Vector3d& place_mm) { return NearestValue(difference, place_mm); },
+      DifferenceColour, plane);
+}
+
+Colour DifferenceColour(uint8_t difference) {
+  if (difference == kOnlyInLabels) return SegmentColour(1);
+  return difference == kOnlyInImage ? SegmentColour(0) : SegmentColour(2);
 }
 
 }  // namespace tissueform

@@ -38,4 +38,9 @@ Picture DrawPlainSlice(const HuGrid& hu, const GridGeometry& over, const SlicePl
 // with its outline, over the whole extent of the head's grid.
 Picture DrawSlice(const PlanBuild& build, const SlicePlane& plane);
 
+// Where the label map and the CT disagree on bone: the CT in grey with LabelAgreement::difference
+// in the colors of DifferenceColour. REQUIRES: build.labels.
+Picture DrawLabelDifference(const PlanBuild& build, const SlicePlane& plane);
+Colour DifferenceColour(uint8_t difference);
+
 }  // namespace tissueform

@@ -51,6 +51,8 @@ export interface Picking {
 }
 
 const SETTLE_MS = 150;
+/** The bridge makes its models from the case, which has the mesh whose lips part. */
+const NOT_TO_PACS = "this prediction has tissue that sticks, and cannot be sent: choose that lips part under Contact, store the prediction there, and send that";
 
 /**
  * A case on the table: the plan, the session that answers it, the head that shows the answer, and what is laid beside it. The
@@ -114,7 +116,10 @@ export class Workbench implements ShownFace {
     this.pacs = new PacsExports(gateway, caseName);
     this.stored = new StoredPredictions(this.answers, this.pacs, {
       question: () => ({ session: this.live.session, model: this.model.value, poses: this.plan.poses() }),
-      measuresOf: (prediction) => storedMeasures(file, this.landmarks, this.comparer, prediction, this.planned),
+      measuresOf: async (prediction) => {
+        if (prediction.mesh !== (file.parted ?? file).manifest.mesh.name) throw new Error(NOT_TO_PACS);
+        return storedMeasures(file, this.landmarks, this.comparer, prediction, this.planned);
+      },
       onRemoved: async ({ name }) => {
         if (this.comparison.value?.to.name === name) await this.compare(null);
       },

@@ -147,6 +147,28 @@ TEST_F(MeshGenerateTest, OpenBoxIsRefusedAndAnOldMeshStays) {
   EXPECT_THAT(Files(), ElementsAre("box.vtu", "why.vtp"));
 }
 
+TEST_F(MeshGenerateTest, WrapsWhatIsRefusedOtherwise) {
+  Write("two.off", TwoCubes(1.3));
+  EXPECT_THAT(Run({"mesh", "generate", "two.off", "--out", "a.vtu"}),
+              FailsWith(1, HasSubstr("wrap it (`--wrap-mm`)")));
+  const ProcessResult wrapped =
+      Run({"mesh", "generate", "two.off", "--out", "a.vtu", "--wrap-mm", "0.1", "--json"});
+  ASSERT_THAT(wrapped, Succeeds());
+  const nlohmann::json report = nlohmann::json::parse(wrapped.out);
+  EXPECT_DOUBLE_EQ(report["wrapping"]["alpha_mm"].get<double>(), 0.3);
+  EXPECT_LE(report["wrapping"]["largest_to_surface_mm"].get<double>(), 0.4);
+  EXPECT_GT(report["wrapping"]["covered_fraction"].get<double>(), 0.01);
+  EXPECT_FALSE(report["wrapping"]["is_sheet"].get<bool>());
+  EXPECT_THAT(Run({"mesh", "generate", "two.off", "--out", "b.vtu", "--wrap-mm", "0.0001"}),
+              FailsWith(1, HasSubstr("use an offset of")));
+}
+
+TEST_F(MeshGenerateTest, NamesNoWrapThatWouldNotHelp) {
+  Write("half.off", "OFF\n4 2 0\n0 0 0\n9 0 0\n0 9 0\n0 0 9\n3 0 1 2\n3 0 1 3\n");
+  EXPECT_THAT(Run({"mesh", "generate", "half.off", "--out", "a.vtu"}),
+              FailsWith(1, ::testing::Not(HasSubstr("--wrap-mm"))));
+}
+
 TEST_F(MeshGenerateTest, TimeLimitIsOneLine) {
   Write("cube.off", Cube());
   EXPECT_THAT(Run({"mesh", "generate", "cube.off", "--out", "cube.vtu", "--split-surface",

@@ -83,6 +83,33 @@ class PlanBuildTest : public CliTest {
   }
 };
 
+// A label map in a NRRD of one voxel, far from the CT.
+constexpr char kFarLabels[] =
+    "NRRD0004\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 1 1 1\n"
+    "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (9000,0,0)\nencoding: ascii\n"
+    "Segment0_Name:=mandible\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n\n1\n";
+
+TEST_F(PlanBuildTest, LabelsThatDoNotFitAreRefusedInOneLine) {
+  Write("Doe_Jane.nrrd", kFarLabels);
+  const auto expect = [](const ProcessResult& result) {
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, AllOf(HasSubstr("cannot use the label map: the label map does not "
+                                            "overlap the CT"),
+                                  Not(HasSubstr("Doe"))));
+  };
+  expect(Build({"--labels", "Doe_Jane.nrrd"}));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "head"));
+  expect(Run({"plan", "check", "--ct", TestDataPath("ct/headsq/headsq_quarter.nhdr"), "--labels",
+              "Doe_Jane.nrrd", "--recipe", "recipe.json"}));
+}
+
+TEST_F(PlanBuildTest, PlanCheckNeedsAPlanOrLabelsWithTheirCt) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"plan", "check"}, {"plan", "check", "--labels", "a.nrrd"}}) {
+    EXPECT_EQ(Run(words).exit_code, 2);
+  }
+}
+
 TEST_F(PlanBuildTest, PlanIsBuiltReportedAndCanBeRun) {
   if (const auto display = VirtualDisplay::Open(); absl::IsNotFound(display.status())) {
     GTEST_SKIP() << display.status();
@@ -216,6 +243,13 @@ TEST_F(PlanBuildTest, FolderThatCannotBeFilledIsRefusedBeforeTheWork) {
 TEST_F(PlanBuildTest, WrongUseIsOneLine) {
   EXPECT_THAT(Run({"plan", "build"}), FailsWith(2, HasSubstr("tissueform plan build --help")));
   EXPECT_THAT(Build({"--out", "head", "--threads", "many"}), FailsWith(2, HasSubstr("many")));
+  EXPECT_THAT(Run({"plan", "build", "--out", "head", "--surfaces", "a.json", "--ct", "b.nrrd",
+                   "--recipe", "recipe.json"}),
+              FailsWith(2, HasSubstr("--surfaces")));
+  EXPECT_THAT(Run({"plan", "build", "--out", "head", "--ct", "b.nrrd"}),
+              FailsWith(2, HasSubstr("--recipe")));
+  EXPECT_THAT(Run({"plan", "build", "--out", "head", "--no-pictures", "--surfaces", "a.json"}),
+              FailsWith(1, HasSubstr("a.json")));
   const ProcessResult help = Run({"plan", "build", "--help"});
   EXPECT_THAT(help, Succeeds());
   EXPECT_THAT(help.out, AllOf(HasSubstr("\"osteotomy\": \"bssro\""), HasSubstr("Examples")));

@@ -18,7 +18,8 @@ TEST_F(UsageTest, WrongUseIsOneLineAndExitCodeTwo) {
   EXPECT_THAT(Run({"mesh"}), FailsWith(2, HasSubstr("tissueform mesh --help")));
   EXPECT_THAT(Run({"mesh", "check"}), FailsWith(2, HasSubstr("MESH")));
   EXPECT_THAT(Run({"mesh", "check", "a.vtu", "b.vtu"}), FailsWith(2, HasSubstr("b.vtu")));
-  EXPECT_THAT(Run({"plan", "check", "--frob"}), FailsWith(2, HasSubstr("PLAN")));
+  EXPECT_THAT(Run({"plan", "check"}), FailsWith(2, HasSubstr("PLAN")));
+  EXPECT_THAT(Run({"plan", "check", "--frob"}), FailsWith(2, HasSubstr("--frob")));
   EXPECT_THAT(Run({"deform", "plan.json"}), FailsWith(2, HasSubstr("--out")));
   EXPECT_THAT(Run({"deform", "plan.json", "--out", "out.obj"}),
               FailsWith(2, HasSubstr("must end with .vtu")));

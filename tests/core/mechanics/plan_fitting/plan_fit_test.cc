@@ -46,7 +46,10 @@ std::vector<FitFreedom> AllMay(const ConstraintSet& constraints, double degrees,
 // A mesh with its model and what is asked of it.
 struct Case {
   Case(const TetMesh& the_mesh, int num_handles, DeformationModel model)
-      : mesh(the_mesh), preparation(testing::PrepareMesh(mesh, num_handles)) {
+      : Case(the_mesh, testing::PrepareMesh(the_mesh, num_handles), model) {}
+
+  Case(const TetMesh& the_mesh, std::shared_ptr<MeshPreparation> of_mesh, DeformationModel model)
+      : mesh(the_mesh), preparation(std::move(of_mesh)) {
     options.model = model;
     options.neo_hookean.tolerance = 1e-6;
     deformer = *CreateDeformer(preparation, options);
@@ -141,6 +144,41 @@ TEST_P(KnownPoseTest, IsFoundAgainOnAJitteredBarWithTwoHandles) {
   for (const FittedUnknown& unknown : fit.unknowns) {
     EXPECT_GT(unknown.determination.by_targets, 0.99);
   }
+}
+
+// A bar whose upper end is moved against a wall, which it meets in part.
+TEST(PlanFitContactTest, AKnownPoseIsFoundAgainWhereTissueTouches) {
+  const TetMesh mesh = testing::Bar({4, 4, 8}, 2.0);
+  const auto vertices_where = [&mesh](auto is_chosen) {
+    return testing::SelectVertices(mesh, [&](const Vector3d& x) { return is_chosen(x); });
+  };
+  std::vector<ContactRow> rows;
+  for (const int32_t v :
+       vertices_where([](const auto& x) { return x.x() == 0 && x.z() > 0 && x.z() < 16; })) {
+    rows.push_back({.vertex = v, .normal = Vector3d::UnitX(), .gap_mm = 0.1});
+  }
+  const auto ends = ConstraintSet::Create(
+      mesh, vertices_where([](const auto& x) { return x.z() == 0; }),
+      {{"top", vertices_where([](const auto& x) { return x.z() == 16; })}}, rows);
+  ASSERT_TRUE(ends.ok()) << ends.status();
+  Case bar(mesh,
+           *MeshPreparation::Create(mesh, Eigen::VectorXd::Constant(mesh.num_tets(), 15000.0),
+                                    *ends, {}),
+           DeformationModel::kLinearElastic);
+  const std::vector<HandlePose> known = {{.rotation_vector = {0, 4 * kDegree, 2 * kDegree},
+                                          .pivot_mm = {4, 4, 16},
+                                          .translation_mm = {-0.6, 0.3, -0.4}}};
+  const std::vector<double> forces = bar.deformer->Deform(known)->contact.forces;
+  const auto open = std::ranges::count(forces, 0.0);
+  ASSERT_GT(open, 0);
+  ASSERT_LT(open, std::ssize(forces));
+  FitRequest request = bar.TargetsOf(known, 12);
+  request.moving = AllMay(bar.constraints(), 15, 5);
+  request.less_movement = 1e-4;
+  ASSERT_OK_AND_ASSIGN(const PlanFit fit, bar.Fit(request));
+  ExpectSamePoses(fit.poses, known);
+  EXPECT_TRUE(fit.verified);
+  for (const FittedTarget& target : fit.targets) EXPECT_LT(target.missed_mm, 0.005);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -115,6 +115,34 @@ TEST(RecipeTest, SenselessValuesAreRefused) {
               StatusIs(kInvalid, HasSubstr("hu_below")));
 }
 
+TEST(RecipeTest, LabelsAreOfVersion5AndTheFileNameIsNotPassedOn) {
+  const auto parse = [](const std::string& version, const std::string& labels) {
+    return ParseRecipe(R"({"format": "tissueform-recipe", "version": )" + version +
+                           R"(, "segments": [{"name": "chin", "osteotomy": "genioplasty"}], )" +
+                           R"("labels": )" + labels + "}",
+                       "r");
+  };
+  ASSERT_OK_AND_ASSIGN(const Recipe given,
+                       parse("5", R"({"file": "smith.nii.gz", "convention": "totalsegmentator",
+                                      "names": {"mandible": ["lower jaw", 2], "tube": [9]}})"));
+  EXPECT_EQ(given.labels.file, "smith.nii.gz");
+  EXPECT_EQ(given.labels.convention, "totalsegmentator");
+  ASSERT_EQ(given.labels.names.size(), 3U);
+  EXPECT_EQ(given.labels.names[0].structure, Structure::kLowerJaw);
+  EXPECT_EQ(given.labels.names[0].name, "lower jaw");
+  EXPECT_EQ(given.labels.names[1].value, 2);
+  EXPECT_EQ(given.labels.names[2].structure, Structure::kTube);
+  const std::string told = RecipeToJson(given);
+  EXPECT_THAT(told, HasSubstr("\"version\": 5"));
+  EXPECT_THAT(told, HasSubstr("lower jaw"));
+  EXPECT_THAT(told, ::testing::Not(HasSubstr("smith")));
+  EXPECT_THAT(parse("4", R"({"file": "a.nii"})"), StatusIs(kInvalid, HasSubstr("labels")));
+  EXPECT_THAT(parse("5", R"({"names": {"jaw": [1]}})"),
+              StatusIs(kInvalid, HasSubstr("use mandible, skull")));
+  EXPECT_THAT(parse("5", R"({"names": {"mandible": [0]}})"),
+              StatusIs(kInvalid, HasSubstr("/labels/names")));
+}
+
 TEST(RecipeTest, LipsAreOfVersion4) {
   const auto parse = [](const std::string& version, const std::string& lips) {
     return ParseRecipe(R"({"format": "tissueform-recipe", "version": )" + version +
