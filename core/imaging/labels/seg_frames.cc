@@ -86,6 +86,7 @@ absl::Status NotOneVolume(absl::string_view why) {
 
 std::vector<double> HeightsOf(const std::vector<SegFrame>& frames, const Eigen::Vector3d& normal) {
   std::vector<double> heights;
+  heights.reserve(frames.size());
   for (const SegFrame& frame : frames) heights.push_back(frame.position_mm.dot(normal));
   std::sort(heights.begin(), heights.end());
   heights.erase(std::unique(heights.begin(), heights.end(),
