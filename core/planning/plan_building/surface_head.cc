@@ -135,7 +135,7 @@ class HeadMaker {
   // Gives the voxels inside a bone its label. Those that an earlier one has stay its own.
   absl::Status AddBone(const TriangleMesh& mesh, const std::string& what, uint8_t label,
                        LabelGrid* labels) {
-    TF_ASSIGN_OR_RETURN(const LabelGrid inside, SolidOf(mesh, what, labels->geometry, threads_));
+    TF_ASSIGN_OR_RETURN(LabelGrid inside, SolidOf(mesh, what, labels->geometry, threads_));
     int64_t shared = 0;
     int64_t all = 0;
     for (size_t i = 0; i < inside.values.size(); ++i) {
