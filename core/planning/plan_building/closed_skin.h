@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "core/mesh/triangle_mesh.h"
 #include "core/planning/plan_building/solid_voxels.h"
 

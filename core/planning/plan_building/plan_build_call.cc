@@ -27,9 +27,8 @@ constexpr int64_t kStage = 1;
 constexpr int64_t kFractionUnits = 1'000'000;
 
 void SendRequest(const PlanBuildRequest& request, PipeSender* to) {
-  for (const std::string& text :
-       {request.ct, request.recipe, request.surfaces, request.labels, request.folder,
-        request.folder_name}) {
+  for (const std::string& text : {request.ct, request.recipe, request.surfaces, request.labels,
+                                  request.folder, request.folder_name}) {
     to->Text(text);
   }
   to->Number(request.threads);
@@ -39,9 +38,8 @@ void SendRequest(const PlanBuildRequest& request, PipeSender* to) {
 
 absl::StatusOr<PlanBuildRequest> ReceiveRequest(PipeReceiver* from) {
   PlanBuildRequest request;
-  for (std::string* text :
-       {&request.ct, &request.recipe, &request.surfaces, &request.labels, &request.folder,
-        &request.folder_name}) {
+  for (std::string* text : {&request.ct, &request.recipe, &request.surfaces, &request.labels,
+                            &request.folder, &request.folder_name}) {
     TF_ASSIGN_OR_RETURN(*text, from->Text());
   }
   TF_ASSIGN_OR_RETURN(const int64_t threads, from->Number(kMaxThreads));

@@ -182,7 +182,7 @@ absl::StatusOr<Anatomy> FindAnatomyOfSurfaces(SurfaceHead made, const Recipe& re
   return WithFrame(std::move(made.head), std::move(made.parts), *landmarks, recipe);
 }
 
-absl::StatusOr<TriangleMesh> SegmentSurface(const LabelGrid& bone, uint8_t label) {
+absl::StatusOr<TriangleMesh> SurfaceOfSegment(const LabelGrid& bone, uint8_t label) {
   LabelGrid mask = MaskWhere(bone, [label](uint8_t value) { return value == label; });
   mask = Crop(mask, Grown(BoundingBox(mask), 3, mask.geometry));
   return ExtractSurface(GaussianSmooth(SignedDistanceMm(mask), 0.7 * mask.geometry.spacing_mm));
@@ -200,7 +200,7 @@ absl::StatusOr<BuiltSegment> BuildSegment(const LabelGrid& bone, uint8_t label,
                                           OsteotomySegment cut, const HandlePose& pose) {
   const double largest_move_mm = LargestMoveMm(bone, label, pose);
   TF_RETURN_IF_ERROR(CheckMove(cut.name, largest_move_mm));
-  TF_ASSIGN_OR_RETURN(TriangleMesh surface, SegmentSurface(bone, label));
+  TF_ASSIGN_OR_RETURN(TriangleMesh surface, SurfaceOfSegment(bone, label));
   const auto voxels = std::count(bone.values.begin(), bone.values.end(), label);
   return BuiltSegment{.cut = std::move(cut),
                       .pose = pose,

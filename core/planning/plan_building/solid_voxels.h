@@ -5,6 +5,8 @@
 
 #include <array>
 
+#include <Eigen/Geometry>
+
 #include "core/imaging/anatomy/grid_operations.h"
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/mesh/triangle_mesh.h"
