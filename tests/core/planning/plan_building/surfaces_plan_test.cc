@@ -36,9 +36,9 @@ using Json = nlohmann::json;
 class SurfacesPlanTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    absl::StatusOr<ExportedHead> head = ExportHead(HeadPhantom(), HeadPhantomParts(), 12);
-    ASSERT_THAT(head.status(), IsOk());
-    head = new ExportedHead(*std::move(head));
+    absl::StatusOr<ExportedHead> exported = ExportHead(HeadPhantom(), HeadPhantomParts(), 12);
+    ASSERT_THAT(exported.status(), IsOk());
+    head = new ExportedHead(*std::move(exported));
   }
   static void TearDownTestSuite() {
     delete head;
