@@ -38,18 +38,18 @@ class SurfacesPlanTest : public ::testing::Test {
   static void SetUpTestSuite() {
     absl::StatusOr<ExportedHead> exported = ExportHead(HeadPhantom(), HeadPhantomParts(), 12);
     ASSERT_THAT(exported.status(), IsOk());
-    head = new ExportedHead(*std::move(exported));
+    phantom = new ExportedHead(*std::move(exported));
   }
   static void TearDownTestSuite() {
-    delete head;
-    head = nullptr;
+    delete phantom;
+    phantom = nullptr;
   }
 
   void SetUp() override {
     folder_ = ::testing::TempDir() + "/surfaces_" +
               ::testing::UnitTest::GetInstance()->current_test_info()->name();
     std::filesystem::create_directories(folder_);
-    ASSERT_THAT(WriteHead(*head, folder_), IsOk());
+    ASSERT_THAT(WriteHead(*phantom, folder_), IsOk());
     json_ = {
         {"format", "tissueform-surfaces"},
         {"version", 1},
@@ -75,8 +75,8 @@ class SurfacesPlanTest : public ::testing::Test {
         IsOk());
   }
   void TransformAll(const Eigen::Matrix3d& linear) const {
-    ASSERT_THAT(WriteHead({Transformed(head->skin, linear), Transformed(head->skull, linear),
-                           Transformed(head->lower_jaw, linear)},
+    ASSERT_THAT(WriteHead({Transformed(phantom->skin, linear), Transformed(phantom->skull, linear),
+                           Transformed(phantom->lower_jaw, linear)},
                           folder_),
                 IsOk());
   }
@@ -91,11 +91,11 @@ class SurfacesPlanTest : public ::testing::Test {
     return message;
   }
 
-  static ExportedHead* head;
+  static ExportedHead* phantom;
   std::string folder_;
   Json json_;
 };
-ExportedHead* SurfacesPlanTest::head = nullptr;
+ExportedHead* SurfacesPlanTest::phantom = nullptr;
 
 // Of the skin in a region, in mm.
 double MeanBackward(const PlanBuild& build, const Positions& moved, SkinRegion region) {
@@ -175,8 +175,8 @@ TEST_F(SurfacesPlanTest, DamagedSurfacesGiveNearlyTheSamePlan) {
     }
     return *TriangleMesh::Create(mesh.positions(), kept);
   };
-  ASSERT_THAT(WriteHead({without_some(head->skin), without_some(head->skull),
-                         without_some(head->lower_jaw)},
+  ASSERT_THAT(WriteHead({without_some(phantom->skin), without_some(phantom->skull),
+                         without_some(phantom->lower_jaw)},
                         folder_),
               IsOk());
   const absl::StatusOr<PlanBuild> damaged = Build();
@@ -200,7 +200,7 @@ TEST_F(SurfacesPlanTest, HeadCutByABoxGivesNearlyTheSameFace) {
     for (size_t f = 0; f < kept.size(); ++f) triangles.row(static_cast<Eigen::Index>(f)) = kept[f];
     return *TriangleMesh::Create(mesh.positions(), triangles);
   };
-  ASSERT_THAT(WriteHead({in_box(head->skin), in_box(head->skull), head->lower_jaw}, folder_),
+  ASSERT_THAT(WriteHead({in_box(phantom->skin), in_box(phantom->skull), phantom->lower_jaw}, folder_),
               IsOk());
   const absl::StatusOr<PlanBuild> cut = Build();
   ASSERT_THAT(cut.status(), IsOk());
@@ -225,7 +225,7 @@ TEST_F(SurfacesPlanTest, SolidHeadKeepsItsFaceAndLosesItsBrain) {
   ForEachVoxel(solid, [&](size_t index, const Eigen::Vector3d&) { hu.values[index] = 0; });
   const absl::StatusOr<ExportedHead> head = ExportHead(hu, parts, 12);
   ASSERT_THAT(head.status(), IsOk());
-  ASSERT_THAT(WriteHead(*head, folder_), IsOk());
+  ASSERT_THAT(WriteHead(*phantom, folder_), IsOk());
   json_["skin"]["wrap_mm"] = 2;  // also fills what is left of cavities
   const absl::StatusOr<PlanBuild> build = Build();
   ASSERT_THAT(build.status(), IsOk());
@@ -289,9 +289,9 @@ TEST_F(SurfacesPlanTest, MovementComesFromATransformOrAMovedSurface) {
 
   segment.erase("transform");
   segment["moved"]["file"] = "after.stl";
-  Positions after = head->lower_jaw.positions();
+  Positions after = phantom->lower_jaw.positions();
   after.rowwise() += Eigen::RowVector3d(1, 6, 0);
-  WriteSurface("after.stl", *TriangleMesh::Create(after, head->lower_jaw.triangles()));
+  WriteSurface("after.stl", *TriangleMesh::Create(after, phantom->lower_jaw.triangles()));
   const absl::StatusOr<SurfacesInput> by_fit = ReadSurfaces(Write(), 1);
   ASSERT_THAT(by_fit.status(), IsOk());
   EXPECT_LT((by_fit->recipe.segments[0].pose.translation_mm - Eigen::Vector3d(1, 6, 0)).norm(),
@@ -356,8 +356,8 @@ TEST_F(SurfacesPlanTest, RefusesCoordinatesThatCannotBe) {
 
   TransformAll(Eigen::Matrix3d::Identity());
   WriteSurface("skull.stl", *TriangleMesh::Create(
-                                head->skull.positions().rowwise() + Eigen::RowVector3d(0, 90, 0),
-                                head->skull.triangles()));
+                                phantom->skull.positions().rowwise() + Eigen::RowVector3d(0, 90, 0),
+                                phantom->skull.triangles()));
   EXPECT_THAT(Refusal(), HasSubstr("outside the skin"));
 }
 
