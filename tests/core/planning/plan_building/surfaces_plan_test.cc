@@ -200,8 +200,9 @@ TEST_F(SurfacesPlanTest, HeadCutByABoxGivesNearlyTheSameFace) {
     for (size_t f = 0; f < kept.size(); ++f) triangles.row(static_cast<Eigen::Index>(f)) = kept[f];
     return *TriangleMesh::Create(mesh.positions(), triangles);
   };
-  ASSERT_THAT(WriteHead({in_box(phantom->skin), in_box(phantom->skull), phantom->lower_jaw}, folder_),
-              IsOk());
+  ASSERT_THAT(
+      WriteHead({in_box(phantom->skin), in_box(phantom->skull), phantom->lower_jaw}, folder_),
+      IsOk());
   const absl::StatusOr<PlanBuild> cut = Build();
   ASSERT_THAT(cut.status(), IsOk());
   const Eigen::Vector3d chin = plain->landmarks.skin_pogonion;
