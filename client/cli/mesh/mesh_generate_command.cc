@@ -3,6 +3,7 @@
 
 #include "client/cli/mesh/mesh_generate_command.h"
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -47,6 +48,16 @@ std::vector<double> Numbers(const std::string& text) {
     if (!absl::SimpleAtod(part, &numbers.emplace_back())) return {};
   }
   return numbers;
+}
+
+// CLI11's own check prints the largest number there is, with 309 digits.
+CLI::Validator Positive() {
+  const auto check = [](const std::string& text) -> std::string {
+    double value = 0;
+    if (absl::SimpleAtod(text, &value) && std::isfinite(value) && value > 0) return "";
+    return absl::StrCat("\"", text, "\" is not a number above 0");
+  };
+  return {check, "POSITIVE"};
 }
 
 CLI::Validator NumbersBetweenCommas(size_t least, size_t most, const char* form) {
@@ -199,18 +210,18 @@ void AddQualityOptions(CLI::App* generate, MeshGenerateOptions* options) {
                                 "intersecting and separate pieces; gaps up to ",
                                 2 * kAlphaPerOffset, " times as wide are bridged (alpha is ",
                                 kAlphaPerOffset, " times the distance)"))
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   generate
       ->add_option("--remesh-mm", options->remesh_mm,
                    "remesh the surface to edges of this length first")
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   auto* edge = generate
                    ->add_option("--edge-mm", options->edge_mm,
                                 "largest tets inside: the volume of a regular tet with this edge")
-                   ->check(CLI::PositiveNumber);
+                   ->check(Positive());
   generate
       ->add_option("--max-volume-mm3", filling.max_tet_volume_mm3, "largest volume of a tet inside")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->excludes(edge);
   generate
       ->add_option("--radius-edge", filling.max_radius_edge_ratio,

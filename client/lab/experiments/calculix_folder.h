@@ -14,7 +14,7 @@ namespace tissueform {
 class CalculixFolder {
  public:
   explicit CalculixFolder(std::string path) : path_(std::move(path)) {
-    std::error_code ignored;  // what it costs is told by the first file that cannot be written
+    std::error_code ignored;  // the first file that cannot be written reports the reason
     std::filesystem::create_directories(path_, ignored);
   }
   ~CalculixFolder() {

@@ -351,8 +351,9 @@ absl::StatusOr<SurfacesInput> ReadParsed(const Json& json, const std::string& pa
                        .provenance = std::move(provenance)};
 }
 
-absl::StatusOr<SurfacesInput> ReadUnnamed(const std::string& path, int threads) {
-  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "surfaces file", kMaxRecipeBytes));
+// `path`: to which the paths in the text are relative.
+absl::StatusOr<SurfacesInput> ReadUnnamed(const std::string& text, const std::string& path,
+                                          int threads) {
   TF_ASSIGN_OR_RETURN(const Json json, ParseJsonStrictly(text));
   TF_RETURN_IF_ERROR(SurfacesSchema().Check(json));
   try {
@@ -365,7 +366,8 @@ absl::StatusOr<SurfacesInput> ReadUnnamed(const std::string& path, int threads) 
 }  // namespace
 
 absl::StatusOr<SurfacesInput> ReadSurfaces(const std::string& path, int threads) {
-  absl::StatusOr<SurfacesInput> input = ReadUnnamed(path, threads);
+  TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(path, "surfaces", kMaxRecipeBytes));
+  absl::StatusOr<SurfacesInput> input = ReadUnnamed(text, path, threads);
   if (input.ok()) return input;
   return absl::Status(input.status().code(),
                       absl::StrCat("surfaces ", path, ": ", input.status().message()));

@@ -13,18 +13,12 @@ import unittest
 import unittest.mock
 
 import meshio
+import nbclient
+import nbformat
 import numpy as np
 import tissueform
 from programs import BIN, SOURCE
 from tissueform import sample_bar
-
-try:
-    import nbclient
-    import nbformat
-except ImportError as missing:
-    nbclient, why = None, str(missing)
-else:
-    why = ""
 
 MAX_EXAMPLE_LINES = 15
 MAX_IMPORT_SECONDS = 0.5
@@ -72,7 +66,6 @@ class SpeedTest(unittest.TestCase):
         self.assertLessEqual(min(seconds("tissueform") for _ in range(3)), MAX_IMPORT_SECONDS)
 
 
-@unittest.skipIf(nbclient is None, why)
 class NotebookTest(unittest.TestCase):
     def run_notebook(self, name):
         """The text of its outputs."""

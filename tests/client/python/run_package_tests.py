@@ -4,8 +4,6 @@
 """Runs the tests of the installed package, from outside of the tree.
 
   run_package_tests.py SOURCE PROGRAMS FOLDER PATTERN    FOLDER as install_package.py has made it; PATTERN: "*_test.py"
-
-Exit code 77 where install_package.py could not make it.
 """
 
 import os
@@ -17,8 +15,7 @@ import sys
 def main():
     source, programs, folder, pattern = sys.argv[1:]
     if not pathlib.Path(folder, "venv").is_dir():
-        print("the package is not installed")
-        sys.exit(77)
+        sys.exit("the package is not installed: install_package.py has failed")
     environment = {**os.environ, "TISSUEFORM_TEST_BIN": programs, "TISSUEFORM_TEST_SOURCE": source, "PYTHONDONTWRITEBYTECODE": "1"}
     environment.pop("PYTHONPATH", None)
     tests = pathlib.Path(__file__).resolve().parent

@@ -3,29 +3,21 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Writes label maps of a phantom with pydicom, nibabel, VTK and Teem's unu: label_reader_test.cc reads them.
 
-Usage: write_labels.py DIR. Exit code 77 when a module or program is missing.
+Usage: write_labels.py DIR.
 """
 
 import os
-import shutil
 import subprocess
 import sys
 
-try:
-    import nibabel
-    import numpy as np
-    import pydicom
-    import vtk
-    from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
-    from pydicom.sequence import Sequence
-    from pydicom.uid import ExplicitVRLittleEndian
-    from vtk.util.numpy_support import numpy_to_vtk
-except ImportError as error:
-    print(f"{error.name} is missing", file=sys.stderr)
-    sys.exit(77)
-if shutil.which("teem-unu") is None:
-    print("teem-unu is missing", file=sys.stderr)
-    sys.exit(77)
+import nibabel
+import numpy as np
+import pydicom
+import vtk
+from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
+from pydicom.sequence import Sequence
+from pydicom.uid import ExplicitVRLittleEndian
+from vtk.util.numpy_support import numpy_to_vtk
 
 # The phantom, as label_reader_test.cc has it: i, j, k, with the last index excluded.
 SIZE = (20, 24, 16)
