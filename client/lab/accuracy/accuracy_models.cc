@@ -98,13 +98,21 @@ absl::StatusOr<ModelAnswer> AnswerByModel(const ModelVariant& variant, const Acc
                      deformation.summary.converged};
 }
 
+CalculixProblem ForCalculix(const AccuracyCase& problem, double poisson_ratio, CalculixLaw law) {
+  return {problem.mesh,
+          problem.stiffness,
+          poisson_ratio,
+          problem.constraints,
+          ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses),
+          law,
+          /*forces_and_stresses=*/false,
+          BoneMotions(problem.mesh, problem.constraints, problem.poses)};
+}
+
 absl::StatusOr<ModelAnswer> AnswerByCalculix(CalculixLaw law, const AccuracyCase& problem,
                                              double poisson_ratio, const std::string& folder) {
-  TF_ASSIGN_OR_RETURN(
-      CalculixResult result,
-      RunCalculix({problem.mesh, problem.stiffness, poisson_ratio, problem.constraints,
-                   ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses), law},
-                  folder));
+  TF_ASSIGN_OR_RETURN(CalculixResult result,
+                      RunCalculix(ForCalculix(problem, poisson_ratio, law), folder));
   const Eigen::Index inverted = MeasureDeformation(problem.mesh, result.deformed).inverted_tets;
   return ModelAnswer{law == CalculixLaw::kLinear ? "calculix_linear" : "calculix_neo_hookean",
                      std::move(result.deformed), result.seconds, inverted, true};

@@ -41,6 +41,10 @@ struct ModelAnswer {
 absl::StatusOr<ModelAnswer> AnswerByModel(const ModelVariant& variant, const AccuracyCase& problem,
                                           double poisson_ratio);
 
+// The case as CalculiX gets it, with gap elements for contact rows; forces and stresses not asked
+// for.
+CalculixProblem ForCalculix(const AccuracyCase& problem, double poisson_ratio, CalculixLaw law);
+
 // "calculix_linear" or "calculix_neo_hookean". Errors: those of RunCalculix.
 absl::StatusOr<ModelAnswer> AnswerByCalculix(CalculixLaw law, const AccuracyCase& problem,
                                              double poisson_ratio, const std::string& folder);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/lab/accuracy/accuracy_models.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/bar_mesh.h"
 
@@ -92,15 +93,10 @@ absl::StatusOr<AccuracyCase> TwoBlocks() {
 }
 
 CalculixProblem TwoBlocksForCalculix(const AccuracyCase& problem) {
-  return {problem.mesh,
-          problem.stiffness,
-          kBlockPoissonRatio,
-          problem.constraints,
-          ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses),
-          CalculixLaw::kLinear,
-          /*forces_and_stresses=*/true,
-          BoneMotions(problem.mesh, problem.constraints, problem.poses),
-          CalculixContact::kSurfaces};
+  CalculixProblem of_calculix = ForCalculix(problem, kBlockPoissonRatio, CalculixLaw::kLinear);
+  of_calculix.forces_and_stresses = true;
+  of_calculix.contact = CalculixContact::kSurfaces;
+  return of_calculix;
 }
 
 absl::StatusOr<AccuracyCase> BlockUnderPlate() {

@@ -13,6 +13,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/lab/accuracy/accuracy_case_list.h"
+#include "client/lab/accuracy/accuracy_models.h"
 #include "client/lab/accuracy/calculix.h"
 #include "client/lab/accuracy/contact_cases.h"
 #include "client/lab/experiments/calculix_folder.h"
@@ -49,18 +50,6 @@ absl::StatusOr<Deformation> DeformationOf(const Comparison& comparison) {
   return deformer->Deform(problem.poses);
 }
 
-// Of the same rows, by gap elements.
-CalculixProblem SameRows(const AccuracyCase& problem) {
-  return {problem.mesh,
-          problem.stiffness,
-          kHeadPoissonRatio,
-          problem.constraints,
-          ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses),
-          CalculixLaw::kLinear,
-          /*forces_and_stresses=*/false,
-          BoneMotions(problem.mesh, problem.constraints, problem.poses)};
-}
-
 absl::StatusOr<std::vector<Comparison>> AllComparisons(const ExperimentOptions& options) {
   TF_ASSIGN_OR_RETURN(AccuracyCase blocks, TwoBlocks());
   TF_ASSIGN_OR_RETURN(AccuracyCase plate, BlockUnderPlate());
@@ -68,7 +57,7 @@ absl::StatusOr<std::vector<Comparison>> AllComparisons(const ExperimentOptions& 
   TF_ASSIGN_OR_RETURN(const AccuracyCase chin, CreateAccuracyCase("head_chin", options.find_plan));
   TF_ASSIGN_OR_RETURN(AccuracyCase head, WithContactRows(chin));
   CalculixProblem block_surfaces = TwoBlocksForCalculix(blocks);
-  CalculixProblem head_rows = SameRows(head);
+  CalculixProblem head_rows = ForCalculix(head, kHeadPoissonRatio, CalculixLaw::kLinear);
   std::vector<Comparison> all;
   all.push_back({std::move(blocks), std::move(block_surfaces)});
   all.push_back({std::move(plate), std::move(plate_surfaces), DeformationModel::kNeoHookean});

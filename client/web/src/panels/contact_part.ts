@@ -13,6 +13,9 @@ const CHOICES = [
   { value: true, label: "Tissue sticks, lips are one piece" },
 ];
 
+/** What the texts of the models say is true where tissue sticks. */
+const NO_BAND = "Where lips part no model has a 95 % interval, and models other than Linear elastic take seconds.";
+
 /** Whether tissue touches or sticks, and how it touches now; nothing for a case that has no contact. */
 export function contactPart(bench: Workbench, choose: (sticks: boolean) => Promise<void>): HTMLElement {
   const sticks = bench.file.parted !== null;
@@ -40,7 +43,7 @@ function touchPart(bench: Workbench): HTMLElement[] {
   };
   const later = throttleToFrame(() => void show());
   for (const signal of [bench.answer, bench.comparison, bench.bite, bench.localState]) (signal as Signal<unknown>).watch(later);
-  return [el("div", { class: "buttons" }, [shows]), told];
+  return [el("div", { class: "buttons" }, [shows]), told, el("p", { class: "quiet", text: NO_BAND })];
 }
 
 /** How tissue touches, in a sentence or two. */

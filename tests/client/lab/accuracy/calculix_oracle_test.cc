@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/lab/accuracy/accuracy_case.h"
+#include "client/lab/accuracy/accuracy_models.h"
 #include "client/lab/accuracy/calculix.h"
 #include "client/lab/accuracy/contact_cases.h"
 #include "core/mechanics/deformation/create_deformer.h"
@@ -44,11 +45,9 @@ class CalculixOracleTest : public ::testing::Test {
                                            double poisson_ratio, bool forces_and_stresses) const {
     const CalculixLaw law =
         model == DeformationModel::kLinearElastic ? CalculixLaw::kLinear : CalculixLaw::kNeoHookean;
-    return RunCalculix(
-        {problem.mesh, problem.stiffness, poisson_ratio, problem.constraints,
-         ConstrainedDisplacements(problem.mesh, problem.constraints, problem.poses), law,
-         forces_and_stresses, BoneMotions(problem.mesh, problem.constraints, problem.poses)},
-        folder_);
+    CalculixProblem of_calculix = ForCalculix(problem, poisson_ratio, law);
+    of_calculix.forces_and_stresses = forces_and_stresses;
+    return RunCalculix(of_calculix, folder_);
   }
 
   static absl::StatusOr<Positions> Answer(const AccuracyCase& problem, DeformationModel model,

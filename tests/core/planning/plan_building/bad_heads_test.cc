@@ -17,6 +17,7 @@
 
 #include "core/imaging/ct/ct_volume_reader.h"
 #include "core/planning/plan_building/plan_builder.h"
+#include "tests/core/planning/plan_building/coarse_recipe.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -29,15 +30,8 @@ using testing::StatusIs;
 using testing::TestDataPath;
 
 Recipe CoarseRecipe() {
-  Recipe recipe;
+  Recipe recipe = testing::CoarseRecipe();
   recipe.ct.axes = "RPI";
-  recipe.spacing_mm = 2.5;
-  recipe.mesh.edge_mm = 6.5;
-  recipe.mesh.fine_edge_mm = 5;
-  RecipeSegment mandible;
-  mandible.name = "mandible";
-  mandible.pose.translation_mm.y() = -6;
-  recipe.segments = {mandible};
   return recipe;
 }
 

@@ -22,6 +22,7 @@
 #include "core/planning/plan_building/viewer_surfaces.h"
 #include "core/planning/plan_io.h"
 #include "core/planning/skin_places.h"
+#include "tests/core/planning/plan_building/coarse_recipe.h"
 #include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
@@ -36,16 +37,9 @@ using testing::TestDataPath;
 
 // Quick: the bundled head on coarse voxels with coarse tets.
 Recipe CoarseRecipe() {
-  Recipe recipe;
+  Recipe recipe = testing::CoarseRecipe();
   recipe.ct.hu_offset = -1024;
   recipe.ct.axes = "RPI";
-  recipe.spacing_mm = 2.5;
-  recipe.mesh.edge_mm = 6.5;
-  recipe.mesh.fine_edge_mm = 5;
-  RecipeSegment mandible;
-  mandible.name = "mandible";
-  mandible.pose.translation_mm.y() = -6;
-  recipe.segments = {mandible};
   return recipe;
 }
 

@@ -21,6 +21,7 @@
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
 #include "core/planning/plan_building/plan_builder.h"
+#include "tests/core/planning/plan_building/coarse_recipe.h"
 #include "tests/core/planning/plan_building/plan_comparison.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
@@ -43,21 +44,8 @@ constexpr uint8_t kLowerTeethLabel = 4;
 
 constexpr int kThreads = 2;
 
-// Coarse, to be quick.
-Recipe CoarseRecipe() {
-  Recipe recipe;
-  recipe.spacing_mm = 2.5;
-  recipe.mesh.edge_mm = 6.5;
-  recipe.mesh.fine_edge_mm = 5;
-  RecipeSegment mandible;
-  mandible.name = "mandible";
-  mandible.pose.translation_mm.y() = -6;
-  recipe.segments = {mandible};
-  return recipe;
-}
-
 Recipe RecipeOfHead() {
-  Recipe recipe = CoarseRecipe();
+  Recipe recipe = testing::CoarseRecipe();
   recipe.ct.hu_offset = -1024;
   recipe.ct.axes = "RPI";
   return recipe;
@@ -310,9 +298,9 @@ TEST_F(PlanLabelsTest, LabelsOfARealHeadPredictTheSameFaceAndFitNoOtherHead) {
   ASSERT_TRUE(files.ok());
   const std::string ct = files.Path("vhm_head");
   ASSERT_OK_AND_ASSIGN(const PlanBuild by_thresholds,
-                       BuildPlan(ct, CoarseRecipe(), {kThreads, nullptr}));
+                       BuildPlan(ct, testing::CoarseRecipe(), {kThreads, nullptr}));
   const std::string labels = WriteNrrd("vhm", Grown(NamedLabels(by_thresholds)));
-  Recipe recipe = CoarseRecipe();
+  Recipe recipe = testing::CoarseRecipe();
   recipe.labels.file = labels;
   ASSERT_OK_AND_ASSIGN(const PlanBuild build, BuildPlan(ct, recipe, {kThreads, nullptr}));
   ASSERT_OK_AND_ASSIGN(const PlanDifference difference,
