@@ -10,7 +10,7 @@
 # it on loopback only, as above, or leave --insecure out and give TLS and tokens (docs/operations.md), as options, as
 # -e TISSUEFORM_SERVER_..., or in a file that is mounted.
 #
-# The gateway for browsers (docs/gateway.md):
+# deploy/compose.yaml starts both. The gateway for browsers (docs/gateway.md):
 #   docker run --rm -p 127.0.0.1:8080:8080 --entrypoint tissueform-gateway -v /PATH/ca.pem:/ca.pem:ro tissueform --server SERVER:50051 --server-ca /ca.pem --listen 0.0.0.0:8080 --web /usr/share/tissueform/web
 
 FROM debian:12 AS builder

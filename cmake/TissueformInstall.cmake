@@ -25,6 +25,7 @@ set(TISSUEFORM_INSTALL_DATA "${CMAKE_INSTALL_DATADIR}/tissueform")
 
 # tissueform_install_program(TARGET bin|libexec): a program, or a module that programs there load. What runs as a
 # service is a component of its own (`cmake --install BUILD --component server`): a machine that serves wants nothing else.
+# The client library is the component client_cpp (deploy/build_client_library.sh).
 function(tissueform_install_program target where)
   set(component tissueform)
   if(target STREQUAL "tissueform-server")
@@ -120,10 +121,10 @@ function(tissueform_install_library name)
     get_target_property(folder ${target} SOURCE_DIR)
     file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${folder}")
     file(GLOB headers CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*.h")
-    install(FILES ${headers} DESTINATION "${TISSUEFORM_INSTALL_INCLUDE}/${folder}")
+    install(FILES ${headers} DESTINATION "${TISSUEFORM_INSTALL_INCLUDE}/${folder}" COMPONENT client_cpp)
   endforeach()
-  install(TARGETS ${libraries} EXPORT tissueform-targets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-  install(EXPORT tissueform-targets NAMESPACE tissueform:: DESTINATION "${TISSUEFORM_INSTALL_CMAKE}")
+  install(TARGETS ${libraries} EXPORT tissueform-targets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT client_cpp)
+  install(EXPORT tissueform-targets NAMESPACE tissueform:: DESTINATION "${TISSUEFORM_INSTALL_CMAKE}" COMPONENT client_cpp)
   _tissueform_dependencies(TISSUEFORM_DEPENDENCIES ${others})
   configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/tissueform-config.cmake.in"
     "${PROJECT_BINARY_DIR}/tissueform-config.cmake" INSTALL_DESTINATION "${TISSUEFORM_INSTALL_CMAKE}"
@@ -132,7 +133,7 @@ function(tissueform_install_library name)
     COMPATIBILITY SameMinorVersion)
   install(FILES "${PROJECT_BINARY_DIR}/tissueform-config.cmake" "${PROJECT_BINARY_DIR}/tissueform-config-version.cmake"
                 "${PROJECT_SOURCE_DIR}/cmake/FindCholmod.cmake"
-          DESTINATION "${TISSUEFORM_INSTALL_CMAKE}")
+          DESTINATION "${TISSUEFORM_INSTALL_CMAKE}" COMPONENT client_cpp)
 endfunction()
 
 # Programs of the build folder find the data as installed ones do, by a link in its place.
@@ -145,6 +146,7 @@ function(tissueform_install_data)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/tests/data/plans" DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(FILES "${PROJECT_SOURCE_DIR}/docs/plan.schema.json" "${PROJECT_SOURCE_DIR}/docs/recipe.schema.json"
                 "${PROJECT_SOURCE_DIR}/docs/targets.schema.json" "${PROJECT_SOURCE_DIR}/docs/case.schema.json" "${PROJECT_SOURCE_DIR}/docs/viewer.schema.json" "${PROJECT_SOURCE_DIR}/docs/series-rules.schema.json"
+                "${PROJECT_SOURCE_DIR}/docs/surfaces.schema.json" "${PROJECT_SOURCE_DIR}/docs/outcome.schema.json" "${PROJECT_SOURCE_DIR}/docs/cohort.schema.json" "${PROJECT_SOURCE_DIR}/docs/deviations.schema.json"
           DESTINATION "${TISSUEFORM_INSTALL_DATA}")
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/proto/tissueform" DESTINATION "${TISSUEFORM_INSTALL_DATA}/proto"
           FILES_MATCHING PATTERN "*.proto" PATTERN "store" EXCLUDE)  # what a server keeps for itself is no interface

@@ -3,14 +3,15 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
 # Builds the image of the Dockerfile with Debian's buildah, where no container engine and no registry is at hand, starts
-# server and gateway from it, asks both, and prints how large it is and how long that took.
+# server and gateway from it, asks both, holds deploy/compose.yaml against its programs, and prints how large it is and how
+# long that took.
 #
 #   deploy/build_image.sh [--packages FOLDER] [IMAGE.tar]
 #
 # --packages: takes deploy/build_packages.sh's packages from there instead of compiling in a builder; the image is the same.
 # IMAGE.tar: writes the image for `docker load`. JOBS: compilers at once.
 #
-# Needs root, buildah and mmdebstrap (which makes the bases debian:12 and debian:12-slim), a Debian mirror, and npm's
+# Needs root, docker-compose, buildah and mmdebstrap (which makes the bases debian:12 and debian:12-slim), a Debian mirror, and npm's
 # registry for the planner. Takes two minutes with packages, and ten and 8 GB without: not a part of .ci/run.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -29,6 +30,7 @@ started=()
 finish() {
   local pid
   for pid in "${started[@]}"; do kill "$pid" 2>/dev/null || true; done
+  wait || true  # their files keep the storage from being unmounted
   "${tool[@]}" rm --all >/dev/null 2>&1 || true
   umount "$scratch/storage/overlay" 2>/dev/null || true  # where buildah has mounted it upon itself
   rm -rf --one-file-system "$scratch"
@@ -105,6 +107,10 @@ gateway=$address
 
 # Of its files, as every engine unpacks them.
 mount=$("${tool[@]}" mount "$container")
+for package in tissueform-server tissueform-gateway; do
+  [[ -s $mount/usr/share/tissueform/sbom/$package.spdx.json ]] || fail "$package has no bill of materials"
+done
+tests/scripts/check_compose.py "$mount/usr/bin" || fail "deploy/compose.yaml does not fit the image"
 size=$(du -sm "$mount" | cut -f 1)
 echo "image: $size MB unpacked; bases in $based s, image in $built s; server and gateway from it answer"
 if [[ -n $archive ]]; then

@@ -11,6 +11,8 @@
 #
 #   deploy/build_packages.sh [OUT_FOLDER [PACKAGE...]]     build/packages, and all of them
 #
+# Each package has its bill of materials in /usr/share/tissueform/sbom, and a copy beside the package.
+#
 # TISSUEFORM_BUILD_DIR  what was built (default: build/release)
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -56,6 +58,13 @@ add_documents() {
     printf ' -- The Tissueform Authors <tissueform@localhost>  %s\n' "$(date -u -R -d "@$SOURCE_DATE_EPOCH")"
   } | gzip -9n >"$folder/changelog.gz"
   gzip -9nc CHANGELOG.md >"$folder/NEWS-of-tissueform.md.gz"
+}
+
+# What the package is made of. Not in /usr/share/doc, which images leave out.
+add_bill() {
+  local package=$1 tree=$2
+  deploy/write_sbom.py "$package" "$tree" "$tree/usr/share/tissueform/sbom/$package.spdx.json"
+  cp "$tree/usr/share/tissueform/sbom/$package.spdx.json" "$out/${package}_${version}_$architecture.spdx.json"
 }
 
 add_man_page() {
@@ -138,11 +147,12 @@ make_package() {
     exit 1
   fi
   if [[ $package == tissueform-tools ]]; then
-    # The client library is for who builds: cmake --install. The other packages have their own pages.
-    rm -rf "$tree/usr/lib" "$tree/usr/include" "$tree"/usr/share/man/man1/tissueform-{server,gateway,pacs}.1 "$tree/usr/share/doc/tissueform/LICENSE"
+    # The other packages have their own pages.
+    rm -rf "$tree"/usr/share/man/man1/tissueform-{server,gateway,pacs}.1 "$tree/usr/share/doc/tissueform/LICENSE"
     gzip -9n "$tree"/usr/share/man/man1/*.1
   fi
   add_documents "$package" "$tree"
+  add_bill "$package" "$tree"
   write_control "$package" "$tree" "$(depends_on_libraries "$tree")$also" "$more"
   (cd "$tree" && find . -type f -not -path './DEBIAN/*' -printf '%P\0' | sort -z | xargs -0 md5sum >DEBIAN/md5sums)
   dpkg-deb --root-owner-group --build "$tree" "$out/${package}_${version}_$architecture.deb" >/dev/null

@@ -36,6 +36,14 @@ changelog_has_a_date() {
   grep -q "^## \[$version\] - [0-9-]*$" CHANGELOG.md
 }
 
+write_record() {
+  tests/scripts/write_validation.py record build/release >build/validation-record.md || { cat build/validation-record.md; return 1; }
+}
+
+check_bills() {
+  tests/scripts/check_sbom.py build/packages/*.spdx.json
+}
+
 build_packages() {
   deploy/build_packages.sh build/packages
 }
@@ -65,8 +73,10 @@ if [[ -z $quick ]]; then
   step "quick checks" .ci/run
   step "long checks" .ci/full
 fi
+step "validation record" write_record
 step "packages" build_packages
-step "bill of materials" deploy/write_sbom.py
+step "client library" deploy/build_client_library.sh
+step "bills of materials" check_bills
 step "API reference" deploy/build_docs.sh
 
 printf '\n%s' "$table"

@@ -13,6 +13,7 @@
 #include "client/cli/export/export_command.h"
 #include "client/cli/prediction/demo_command.h"
 #include "client/cli/prediction/prediction_command.h"
+#include "client/cli/server_build/server_build_command.h"
 #include "client/cli/session/drag_command.h"
 #include "client/cli/session/library_logs.h"
 #include "client/cli/session/run_command.h"
@@ -33,6 +34,7 @@ int main(int argc, char** argv) {
     tissueform::AddWatchCommand(app, work);
     tissueform::AddPredictionCommand(app, work);
     tissueform::AddCaseCommand(app, work);
+    tissueform::AddServerBuildCommand(app, work);
     tissueform::AddExportCommand(app, work);
     tissueform::AddFollowLinkCommands(*app.get_subcommand(tissueform::kSessionCommand.name), work);
     tissueform::AddShareCommand(app, work);

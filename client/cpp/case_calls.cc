@@ -53,11 +53,13 @@ std::chrono::system_clock::time_point CaseCalls::Deadline() const {
 }
 
 absl::StatusOr<v1::Case> CaseCalls::Upload(absl::string_view bytes, const std::string& title,
-                                           const UploadOptions& options) {
+                                           const UploadOptions& options,
+                                           const std::string& project) {
   v1::CaseHeader header;
   header.set_sha256(Sha256Hex({bytes}));
   header.set_total_bytes(static_cast<int64_t>(bytes.size()));
   header.set_title(title);
+  header.set_project(project);
   const auto give_up = std::chrono::steady_clock::now() + options.give_up_after;
   Backoff backoff(options.backoff);
   for (;;) {

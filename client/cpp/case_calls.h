@@ -32,8 +32,10 @@ class CaseCalls {
 
   // Sends the case unless the server has it. An interrupted upload starts again (on_resumed is not
   // called), also after a restart of the server, until options.give_up_after has passed.
+  // `project`: Case.project.
   absl::StatusOr<v1::Case> Upload(absl::string_view bytes, const std::string& title,
-                                  const UploadOptions& options = {});
+                                  const UploadOptions& options = {},
+                                  const std::string& project = "");
   absl::StatusOr<v1::Case> Get(const std::string& name);
   // All of them, page after page.
   absl::StatusOr<std::vector<v1::Case>> List();

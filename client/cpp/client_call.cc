@@ -41,6 +41,11 @@ absl::Status FromGrpcStatus(const grpc::Status& status) {
 
 absl::Status EndOfCall(const grpc::Status& status, bool was_cancelled) {
   const absl::Status end = FromGrpcStatus(status);
+  if (absl::IsUnimplemented(end)) {
+    return absl::UnimplementedError(
+        "this server is older than this program and does not have this call; update the server, or "
+        "use the program of its version");
+  }
   if (was_cancelled || !absl::IsCancelled(end)) return end;
   const ErrorInfo info = ErrorInfoOf(end);
   const absl::Status lost = absl::UnavailableError(end.message());

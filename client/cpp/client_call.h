@@ -17,7 +17,8 @@ namespace tissueform {
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // How a call has ended. CANCELLED is the client's word alone: of a call that it has not cancelled
-// something between here and there has gone, and it is Unavailable.
+// something between here and there has gone, and it is Unavailable. Unimplemented says that the
+// server is older than the client.
 absl::Status EndOfCall(const grpc::Status& status, bool was_cancelled = false);
 
 // Of an upload that has ended well without its answer: a proxy may reset the stream of a call that

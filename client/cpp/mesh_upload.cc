@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <memory>
-#include <thread>
 #include <utility>
 
 #include "absl/strings/string_view.h"
 #include "grpcpp/client_context.h"
 
 #include "client/cpp/client_call.h"
+#include "client/cpp/upload_attempts.h"
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "proto/conversion/mesh_conversion.h"
@@ -36,20 +36,9 @@ class Sending {
         options_(options) {}
 
   absl::StatusOr<v1::Mesh> Run() {
-    using Clock = std::chrono::steady_clock;
-    Clock::time_point give_up = Clock::now() + options_.give_up_after;
-    Backoff backoff(options_.backoff);
-    for (bool again = false;; again = true) {
-      const int64_t farthest_before = farthest_;
-      absl::StatusOr<v1::Mesh> mesh = TryOnce(again);
-      if (mesh.ok() || !MayRepeat(mesh.status())) return mesh;
-      if (options_.on_interrupted) options_.on_interrupted(mesh.status());
-      // The time counts from the end of an attempt that was of use: one may last for minutes.
-      if (farthest_ > farthest_before) give_up = Clock::now() + options_.give_up_after;
-      const std::chrono::milliseconds wait = backoff.Next();
-      if (Clock::now() + wait > give_up) return mesh;
-      std::this_thread::sleep_for(wait);
-    }
+    return RunUploadAttempts(
+        options_, farthest_, [this](bool again) { return TryOnce(again); },
+        [this](const absl::Status& status) { return MayRepeat(status); });
   }
 
  private:

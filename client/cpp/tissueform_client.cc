@@ -74,6 +74,7 @@ TissueformClient::TissueformClient(const std::shared_ptr<grpc::Channel>& channel
       server_info_(v1::ServerInfoService::NewStub(channel)),
       predictions_(channel, options.call_deadline, &routes_),
       cases_(channel, options.call_deadline, &routes_),
+      plan_builds_(channel, options.call_deadline, &routes_),
       exports_(channel, options.call_deadline, &routes_),
       access_(channel, options.call_deadline, &routes_) {}
 
@@ -152,11 +153,15 @@ absl::Status TissueformClient::DeleteMesh(const std::string& name) {
 
 absl::StatusOr<v1::Session> TissueformClient::CreateSession(const SessionRequest& request) {
   v1::CreateSessionRequest proto = ToProto(request);
-  const CallRepeat repeat = PrepareToRepeat(routes_, &proto);
+  return CreateSession(proto, PrepareToRepeat(routes_, &proto));
+}
+
+absl::StatusOr<v1::Session> TissueformClient::CreateSession(const v1::CreateSessionRequest& request,
+                                                            CallRepeat repeat) {
   v1::Session session;
   TF_RETURN_IF_ERROR(
-      Call(SessionNameOf(request.session_id), repeat, [&](grpc::ClientContext* context) {
-        grpc::Status status = sessions_->CreateSession(context, proto, &session);
+      Call(SessionNameOf(request.session_id()), repeat, [&](grpc::ClientContext* context) {
+        grpc::Status status = sessions_->CreateSession(context, request, &session);
         if (status.ok()) routes_.Remember(session.name(), NodeOf(*context));
         return status;
       }));
@@ -209,7 +214,13 @@ absl::StatusOr<v1::Session> TissueformClient::PrepareSession(
     name = request.update().name();
     repeat = RepeatOf(request.update());
   }
-  return WaitForSession(sessions_.get(), sent, {&routes_, name, repeat, Deadline()}, wait);
+  absl::StatusOr<v1::Session> session =
+      WaitForSession(sessions_.get(), sent, {&routes_, name, repeat, Deadline()}, wait);
+  // Version 0.1 does not tell its stages.
+  if (absl::IsUnimplemented(session.status()) && request.has_create()) {
+    return CreateSession(sent.create(), repeat);
+  }
+  return session;
 }
 
 absl::Status TissueformClient::DeleteSession(const std::string& name) {

@@ -20,6 +20,7 @@
 #include "client/cpp/deform_stream.h"
 #include "client/cpp/export_calls.h"
 #include "client/cpp/mesh_upload.h"
+#include "client/cpp/plan_build_calls.h"
 #include "client/cpp/prediction_calls.h"
 #include "client/cpp/prepare_session.h"
 #include "client/cpp/prepared_evaluator.h"
@@ -133,6 +134,9 @@ class TissueformClient {
   // What planners open.
   CaseCalls& cases() { return cases_; }
 
+  // Plans that the server builds.
+  PlanBuildCalls& plan_builds() { return plan_builds_; }
+
   // What is to go to the PACS.
   ExportCalls& exports() { return exports_; }
 
@@ -146,6 +150,8 @@ class TissueformClient {
   std::chrono::system_clock::time_point Deadline() const {
     return std::chrono::system_clock::now() + options_.call_deadline;
   }
+  absl::StatusOr<v1::Session> CreateSession(const v1::CreateSessionRequest& request,
+                                            CallRepeat repeat);
   absl::Status Call(const std::string& session, CallRepeat repeat,
                     const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
     return RunSessionCall(&routes_, session, repeat, Deadline(), attempt);
@@ -160,6 +166,7 @@ class TissueformClient {
   const std::unique_ptr<v1::ServerInfoService::Stub> server_info_;
   PredictionCalls predictions_;
   CaseCalls cases_;
+  PlanBuildCalls plan_builds_;
   ExportCalls exports_;
   AccessCalls access_;
 };

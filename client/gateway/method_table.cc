@@ -23,8 +23,11 @@ using google::protobuf::io::CodedInputStream;
 // Messages in messages: ours are four deep.
 constexpr int kMaxDepth = 16;
 
-constexpr std::array<absl::string_view, 5> kDownloads = {
-    "tissueform.v1.MeshService.GetSurface", "tissueform.v1.CaseService.ReadCase",
+constexpr std::array<absl::string_view, 7> kDownloads = {
+    "tissueform.v1.MeshService.GetSurface",
+    "tissueform.v1.CaseService.ReadCase",
+    "tissueform.v1.PlanBuildService.ReadBuildDraft",
+    "tissueform.v1.PlanBuildService.ReadPlanBuildFile",
     "tissueform.v1.PredictionService.ReadPositions",
     "tissueform.v1.PredictionService.ComparePredictions",
     "tissueform.v1.DeformService.GetPreparedAnswers"};

@@ -92,6 +92,9 @@ BridgeCommands::BridgeCommands(CLI::App& app, const BridgeOptions* options) : op
   build_ =
       app.add_subcommand("build", "build and pack the plan of a series, regardless of the rules");
   build_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
+  draft_ = app.add_subcommand("draft",
+                              "send the CT of a series to the server, for planning in the browser");
+  draft_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
   publish_ = app.add_subcommand("publish", "publish the case of a series to the server");
   publish_->add_option("SERIES", name_, "its key, as `series` shows it")->required();
   store_ =
@@ -108,9 +111,10 @@ int BridgeCommands::Run() const {
   if (listen_->parsed()) return RunBridge(*options_, BridgeRunKind::kReceiving);
   UnblockEndingSignals();
   const std::vector<std::pair<const CLI::App*, absl::Status (BridgeCommands::*)() const>> steps = {
-      {fetch_, &BridgeCommands::Fetch}, {series_, &BridgeCommands::Series},
-      {build_, &BridgeCommands::Build}, {publish_, &BridgeCommands::Publish},
-      {store_, &BridgeCommands::Store}, {status_, &BridgeCommands::Status}};
+      {fetch_, &BridgeCommands::Fetch},     {series_, &BridgeCommands::Series},
+      {build_, &BridgeCommands::Build},     {draft_, &BridgeCommands::Draft},
+      {publish_, &BridgeCommands::Publish}, {store_, &BridgeCommands::Store},
+      {status_, &BridgeCommands::Status}};
   for (const auto& [command, step] : steps) {
     if (!command->parsed()) continue;
     const absl::Status status = (this->*step)();
@@ -120,7 +124,7 @@ int BridgeCommands::Run() const {
   }
   absl::FPrintF(stderr,
                 "tissueform-pacs: name a command: run, listen, fetch, series, build, "
-                "publish, store or status; see --help\n");
+                "draft, publish, store or status; see --help\n");
   return 2;
 }
 
@@ -189,6 +193,21 @@ absl::Status BridgeCommands::Build() const {
     TF_RETURN_IF_ERROR(work.Step(&series));
   }
   absl::PrintF("%s is %s: %s\n", series.key, SeriesStateName(series.state), series.case_name);
+  return absl::OkStatus();
+}
+
+absl::Status BridgeCommands::Draft() const {
+  TF_ASSIGN_OR_RETURN(const auto parts, BridgeParts::Open(*options_));
+  ReceivedRows rows(&parts->queue());
+  TF_ASSIGN_OR_RETURN(QueuedSeries series, rows.Get(name_));
+  const std::string recipe = options_->recipe.empty() ? series.recipe : options_->recipe;
+  TF_RETURN_IF_ERROR(
+      parts->intake().Choose(series, recipe, "chosen manually", SeriesState::kDrafting));
+  TF_ASSIGN_OR_RETURN(series, rows.Get(name_));
+  PlanWork work = PlanWorkOf(parts.get(), *options_);
+  TF_RETURN_IF_ERROR(work.Step(&series));
+  absl::PrintF("%s is %s: open \"%s\" in the planner\n", series.key, SeriesStateName(series.state),
+               TitleOfSeries(series.key));
   return absl::OkStatus();
 }
 

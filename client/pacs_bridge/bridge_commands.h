@@ -27,6 +27,7 @@ class BridgeCommands {
   absl::Status Fetch() const;
   absl::Status Series() const;
   absl::Status Build() const;
+  absl::Status Draft() const;
   absl::Status Publish() const;
   absl::Status Store() const;
   absl::Status Status() const;
@@ -42,6 +43,7 @@ class BridgeCommands {
   CLI::App* fetch_;
   CLI::App* series_;
   CLI::App* build_;
+  CLI::App* draft_;
   CLI::App* publish_;
   CLI::App* store_;
   CLI::App* status_;

@@ -141,6 +141,9 @@ void AddServer(CLI::App& app, BridgeOptions* options) {
   app.add_option("--server", options->server,
                  "tissueform-server for publishing cases and receiving export requests")
       ->type_name("HOST:PORT");
+  app.add_option("--project", options->project,
+                 "project of cases and drafts on the server; a share of it opens them to planners")
+      ->type_name("NAME");
   ConnectionOptions* connection = &options->connection;
   app.add_flag("--server-tls", connection->tls,
                "use TLS with this machine's certificate authorities");

@@ -41,6 +41,7 @@ struct BridgeOptions {
 
   std::string server = {};  // HOST:PORT; empty: nothing is published or stored
   ConnectionOptions connection = {};
+  std::string project = {};  // of cases and drafts there
 
   ReviewOptions review = {};
   bool has_review = true;

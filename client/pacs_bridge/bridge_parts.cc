@@ -42,6 +42,7 @@ absl::Status BridgeParts::StartAudit(const BridgeOptions& options, const std::st
       OpenAuditSink(options.audit, {.name = "tissueform-pacs", .message_id = kDicomAuditMessageId},
                     options.tls, folder));
   TF_ASSIGN_OR_RETURN(audit_, BridgeAudit::Start(std::move(sink), options.receiver.ae_title));
+  access_audit_ = std::make_unique<AccessAudit>(audit_.get(), AccessAudit::Options{});
   return absl::OkStatus();
 }
 
@@ -65,7 +66,8 @@ absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptio
                                             .watermark_bytes = options.watermark_bytes}));
   TF_RETURN_IF_ERROR(parts->StartAudit(options, folder));
   if (!options.server.empty()) {
-    TF_ASSIGN_OR_RETURN(parts->server_, ConnectToCaseServer(options.server, options.connection));
+    TF_ASSIGN_OR_RETURN(parts->server_,
+                        ConnectToCaseServer(options.server, options.connection, options.project));
   }
   TF_RETURN_IF_ERROR(parts->OpenPacs(options));
   SeriesIntakeOptions intake;
@@ -81,8 +83,8 @@ absl::StatusOr<std::unique_ptr<BridgeParts>> BridgeParts::Open(const BridgeOptio
   parts->intake_ = std::make_unique<SeriesIntake>(parts->queue_.get(), std::move(intake));
   parts->intake_sink_ = std::make_unique<IntakeSink>(parts->intake_.get());
   if (parts->audit_ != nullptr) {
-    parts->audited_sink_ =
-        std::make_unique<AuditedSink>(parts->audit_.get(), parts->intake_sink_.get());
+    parts->audited_sink_ = std::make_unique<AuditedSink>(
+        parts->audit_.get(), parts->access_audit_.get(), parts->intake_sink_.get());
   }
   parts->cancel_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   parts->writer_ = MakePredictionWriter(options.receiver.ae_title, parts->cancel_);

@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 
+#include "client/pacs_bridge/audit/access_audit.h"
 #include "client/pacs_bridge/audit/audited_sink.h"
 #include "client/pacs_bridge/audit/bridge_audit.h"
 #include "client/pacs_bridge/bridge_options.h"
@@ -35,6 +36,8 @@ class BridgeParts {
     if (audited_sink_ != nullptr) return *audited_sink_;
     return *intake_sink_;
   }
+  // Null: no audit.
+  AccessAudit* access_audit() { return access_audit_.get(); }
   // Null: --server, or the PACS, is not given.
   CaseServer* server() { return server_.get(); }
   PacsClient* pacs() { return pacs_.get(); }
@@ -56,6 +59,7 @@ class BridgeParts {
   absl::Status OpenPacs(const BridgeOptions& options);
 
   std::unique_ptr<BridgeAudit> audit_;  // null: none; the others use it
+  std::unique_ptr<AccessAudit> access_audit_;
   std::unique_ptr<BridgeQueue> queue_;
   std::unique_ptr<InstanceFolder> folder_;
   std::unique_ptr<CaseServer> server_;

@@ -45,6 +45,9 @@ class WakingSink final : public InstanceSink {
                                              ended.problem.empty() ? "" : ": ", ended.problem));
     wake_();
   }
+  void ConnectionRefused(const RefusedConnection& refused) override {
+    sink_->ConnectionRefused(refused);
+  }
 
  private:
   InstanceSink* const sink_;
@@ -58,6 +61,18 @@ void WaitForEnd() {
   sigaddset(&signals, SIGINT);
   int number = 0;
   sigwait(&signals, &number);
+}
+
+// The options of the review page, whose logins are audited where that is set.
+ReviewOptions ReviewOptionsOf(const BridgeOptions& options, AccessAudit* audit) {
+  ReviewOptions review = options.review;
+  if (audit == nullptr) return review;
+  review.on_login = [audit](const ReviewLogin& login) {
+    if (login.is_accepted) return audit->LoginAccepted(login.address, login.user);
+    audit->LoginRefused(login.address, login.user);
+    return absl::OkStatus();
+  };
+  return review;
 }
 
 absl::Status CheckRunnable(const BridgeOptions& options) {
@@ -96,8 +111,9 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
   absl::PrintF("receiving on %s:%d\n", options.receiver.address, receiver->port());
   std::unique_ptr<ReviewServer> review;
   if (everything && options.has_review) {
-    TF_ASSIGN_OR_RETURN(review, ReviewServer::Start(options.review, &parts->queue(),
-                                                    [&service] { service.Wake(); }));
+    TF_ASSIGN_OR_RETURN(review,
+                        ReviewServer::Start(ReviewOptionsOf(options, parts->access_audit()),
+                                            &parts->queue(), [&service] { service.Wake(); }));
     absl::PrintF("review page on http://%s:%d/\n", options.review.address, review->port());
   }
   std::fflush(stdout);

@@ -14,6 +14,8 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 1200,
   },
+  // The recipe's schema is in docs.
+  server: { fs: { allow: [".", "../../docs"] } },
   test: {
     include: ["tests/**/*.test.ts"],
     setupFiles: ["tests/testing/web_crypto.ts", "tests/testing/files.ts"],

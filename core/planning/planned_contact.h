@@ -18,6 +18,10 @@
 
 namespace tissueform {
 
+// Of a plan's mesh with contact, on vertices, as numbers of one byte: 1 slides on bone, 2 meets
+// bone, 4 meets the other lip, and their sums.
+inline constexpr char kContactArray[] = "contact";
+
 // The key "contact" of a plan. REQUIRES: it has passed the schema.
 std::vector<PlannedContactRow> ContactFromJson(const nlohmann::json& contact);
 

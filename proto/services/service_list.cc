@@ -8,6 +8,7 @@
 #include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/export_service.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
+#include "tissueform/v1/plan_build_service.pb.h"
 #include "tissueform/v1/plan_service.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
 #include "tissueform/v1/server_info.pb.h"
@@ -21,9 +22,9 @@ std::vector<const google::protobuf::ServiceDescriptor*> FindServices() {
   const google::protobuf::Descriptor* const messages[] = {
       v1::WhoAmIRequest::descriptor(),        v1::GetCaseRequest::descriptor(),
       v1::DeformRequest::descriptor(),        v1::GetExportRequest::descriptor(),
-      v1::GetMeshRequest::descriptor(),       v1::FitRequest::descriptor(),
-      v1::GetPredictionRequest::descriptor(), v1::GetServerInfoRequest::descriptor(),
-      v1::GetSessionRequest::descriptor()};
+      v1::GetMeshRequest::descriptor(),       v1::GetPlanBuildRequest::descriptor(),
+      v1::FitRequest::descriptor(),           v1::GetPredictionRequest::descriptor(),
+      v1::GetServerInfoRequest::descriptor(), v1::GetSessionRequest::descriptor()};
   std::vector<const google::protobuf::ServiceDescriptor*> services;
   for (const google::protobuf::Descriptor* message : messages) {
     for (int i = 0; i < message->file()->service_count(); ++i) {

@@ -30,6 +30,11 @@ constexpr std::array<std::string_view, 9> kOpenToLinks = {
     "SessionService.GetSession",
 };
 
+// What makes cases.
+constexpr std::array<std::string_view, 4> kOfPublishers = {
+    "CaseService.UploadCase", "PlanBuildService.CreateBuildDraft",
+    "PlanBuildService.CreatePlanBuild", "PlanBuildService.UploadBuildFile"};
+
 bool IsBridge(const Principal& caller) { return caller.roles.contains("bridge"); }
 bool IsLink(const Principal& caller) { return !caller.only_session.empty(); }
 
@@ -47,10 +52,11 @@ absl::Status Access::CheckMethodAccess(const Principal& caller, std::string_view
   if (IsLink(caller) && std::ranges::find(kOpenToLinks, method) == kOpenToLinks.end()) {
     return absl::PermissionDeniedError("a follow link can only watch its session; log in for this");
   }
-  if (method == "CaseService.UploadCase" && !caller.anonymous() &&
+  if (std::ranges::find(kOfPublishers, method) != kOfPublishers.end() && !caller.anonymous() &&
       !caller.roles.contains("publisher")) {
     return absl::PermissionDeniedError(
-        "uploading cases requires the role publisher, which the token lacks; ask the "
+        "uploading cases and building plans requires the role publisher, which the token lacks; "
+        "ask the "
         "server's operator");
   }
   if (method == "ExportService.UpdateExport" && !caller.anonymous() && !IsBridge(caller)) {
@@ -340,6 +346,19 @@ absl::StatusOr<std::set<CaseKey>> Access::SharedCases(const Principal& caller) {
     if (std::ranges::find(all, own, &CaseGrant::key) == all.end()) shared.insert(key);
   }
   return shared;
+}
+
+absl::Status Access::CheckProjectItemAccess(const Principal& caller, const ProjectKey& project,
+                                            const absl::Status& not_found, Permission need) {
+  if (project.owner == caller.name) return absl::OkStatus();
+  TF_ASSIGN_OR_RETURN(const auto shared, queries_.SharedProjects(caller.name));
+  const auto found = project.name.empty() ? shared.end() : shared.find(project);
+  const auto role = found == shared.end() ? std::nullopt : std::optional<ShareRole>(found->second);
+  return Judge(LevelOf(project.owner, role, caller), need, not_found);
+}
+
+absl::StatusOr<std::map<ProjectKey, ShareRole>> Access::SharedProjects(const Principal& caller) {
+  return queries_.SharedProjects(caller.name);
 }
 
 absl::StatusOr<FollowLinkRow> Access::FindLink(const std::string& digest) {

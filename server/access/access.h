@@ -110,6 +110,13 @@ class Access {
   // Links that were good are asked for again: after this server has changed rights or sessions.
   void ForgetLinks();
 
+  // What has no rights but its owner's and those of its project (build drafts). Errors:
+  // `not_found`, PermissionDenied.
+  absl::Status CheckProjectItemAccess(const Principal& caller, const ProjectKey& project,
+                                      const absl::Status& not_found, Permission need);
+  // The projects of others that are shared with the caller.
+  absl::StatusOr<std::map<ProjectKey, ShareRole>> SharedProjects(const Principal& caller);
+
   // What is kept, by owner; a mesh is held by each of those who have sent it.
   absl::StatusOr<std::map<std::string, Holdings>> HoldingsByOwner();
   // Whether the caller may keep so many bytes more. Errors: ResourceExhausted (a quota).

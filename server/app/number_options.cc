@@ -67,6 +67,7 @@ std::vector<NumberOption> MakeOptions() {
   constexpr auto kQuotas = &Server::quotas;
   constexpr auto kAccess = &Server::access;
   constexpr auto kExports = &Server::exports;
+  constexpr auto kBuilds = &Server::plan_builds;
   return {
       Option<&Server::workers>("--workers", "workers", 1, 1024,
                                "computing threads of each lane, shared by all sessions (default: "
@@ -155,6 +156,40 @@ std::vector<NumberOption> MakeOptions() {
       Option<kExports, &ExportLimits::max_watches>("--max-export-watches", "max_export_watches", 1,
                                                    kMaxCount,
                                                    "open watches of exports (bridges, planners)"),
+      Option<kBuilds, &PlanBuildLimits::at_once>(
+          "--plan-builds", "plan_builds", 0, 64,
+          "plans built from CTs at the same time; 0: this server builds none"),
+      Option<kBuilds, &PlanBuildLimits::max_waiting>("--max-plan-builds", "max_plan_builds", 1,
+                                                     kMaxCount,
+                                                     "plans being built or waiting for it"),
+      Option<kBuilds, &PlanBuildLimits::max_waiting_of_principal>(
+          "--quota-plan-builds", "quota_plan_builds", 1, kMaxCount,
+          "plans being built or waiting for it, per principal"),
+      Option<kBuilds, &PlanBuildLimits::max_per_day>("--quota-plan-builds-per-day",
+                                                     "quota_plan_builds_per_day", 1, kMaxCount,
+                                                     "plans built in 24 hours, per principal"),
+      Option<kBuilds, &PlanBuildLimits::max_file_bytes>(
+          "--max-build-file-mib", "max_build_file_bytes", 1, kMaxMebibytes,
+          "upload size of one CT, label map or surface", kInMebibytes),
+      Option<kBuilds, &PlanBuildLimits::max_files_bytes>(
+          "--max-build-files-mib", "max_build_files_bytes", 1, kMaxMebibytes,
+          "CTs, label maps and surfaces that are stored, all together", kInMebibytes),
+      Option<kBuilds, &PlanBuildLimits::retention_hours>(
+          "--volume-retention-hours", "volume_retention_hours", 1, kMaxDays * 24,
+          "hours after which a report is deleted, and a CT that its owner keeps after the build or "
+          "has not built from"),
+      Option<kBuilds, &PlanBuildLimits::draft_hours>(
+          "--draft-retention-hours", "draft_retention_hours", 1, kMaxDays * 24,
+          "hours after which a draft of a received CT is deleted, with the CT, unless a plan was "
+          "built of it"),
+      Option<kBuilds, &PlanBuildLimits::max_drafts_of_principal>(
+          "--quota-drafts", "quota_drafts", 1, kMaxCount,
+          "drafts of received CTs that wait, per principal (a PACS bridge)"),
+      Option<kBuilds, &PlanBuildLimits::max_memory_bytes>(
+          "--max-build-memory-mib", "max_build_memory_bytes", 64, kMaxMebibytes,
+          "memory of the program that builds one plan", kInMebibytes),
+      Option<kBuilds, &PlanBuildLimits::max_seconds>("--max-build-seconds", "max_build_seconds", 1,
+                                                     kMaxSeconds, "processor seconds of one build"),
       Option<&Server::drain_deadline>(
           "--drain-seconds", "drain_deadline_ms", 0, 3600,
           "seconds that open calls may continue after SIGTERM or SIGINT", kInfoInMilliseconds),

@@ -11,6 +11,7 @@
 
 #include "server/access/access_options.h"
 #include "server/access/auth/token_options.h"
+#include "server/builds/build_limits.h"
 #include "server/cluster/cluster_options.h"
 #include "server/exports/export_queue.h"
 #include "server/platform/tls_options.h"
@@ -43,6 +44,7 @@ struct ServerOptions {
   TelemetryOptions telemetry = {};
   AccessOptions access = {};
   ExportLimits exports = {};
+  PlanBuildLimits plan_builds = {};
 
   // Half of the machine's memory, one worker a core.
   static ServerOptions Defaults();

@@ -21,6 +21,7 @@
 #include "core/mechanics/linear_solvers/blas_threads.h"
 #include "server/app/library_logs.h"
 #include "server/app/number_options.h"
+#include "server/builds/plan_builder.h"
 #include "server/platform/network_address.h"
 #include "server/platform/process_metrics.h"
 #include "server/platform/tls_credentials.h"
@@ -91,6 +92,26 @@ absl::StatusOr<std::unique_ptr<Telemetry>> StartTelemetry(const ServerOptions& o
                           {.certificate = options.tls.certificate, .key = options.tls.key}, folder);
 }
 
+// Null where no plans are built: without the programs every build would fail after its upload.
+// A node of a cluster has no data folder: what it builds is forgotten when it ends, and HAProxy
+// sends all calls of a person for builds to one node (deploy/haproxy/cluster.cfg).
+absl::StatusOr<std::unique_ptr<BuildRoom>> OpenBuilds(const ServerOptions& options,
+                                                      CaseStore* cases) {
+  const PlanBuildLimits& limits = options.plan_builds;
+  if (limits.at_once == 0) return nullptr;
+  if (const absl::Status programs = CheckPlanBuildPrograms(); !programs.ok()) {
+    spdlog::info("{}", std::string(programs.message()));
+    return nullptr;
+  }
+  std::string folder;
+  if (!options.in_memory && !options.cluster.enabled()) {
+    TF_ASSIGN_OR_RETURN(folder, DataFolderOf(options));
+    folder += "/builds";
+  }
+  const int threads = std::max(1, options.workers / limits.at_once);
+  return BuildRoom::Open(std::move(folder), limits, threads, cases, options.limits.max_cases);
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
@@ -105,6 +126,7 @@ absl::StatusOr<std::unique_ptr<TissueformServer>> TissueformServer::Start(
   parts.authenticator = authenticator != nullptr ? authenticator : parts.tokens.get();
   TF_ASSIGN_OR_RETURN(parts.opened, OpenStores(options));
   // After the stores, which lock the data folder.
+  TF_ASSIGN_OR_RETURN(parts.builds, OpenBuilds(options, &parts.opened.stores->cases()));
   TF_ASSIGN_OR_RETURN(parts.telemetry, StartTelemetry(options));
   if (parts.opened.shared != nullptr) {
     TF_ASSIGN_OR_RETURN(parts.cluster,
@@ -160,6 +182,7 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
              .node_name = cluster_ == nullptr ? "" : cluster_->name()}),
       budget_(options.memory_budget_bytes),
       stores_(std::move(parts.opened.stores)),
+      builds_(std::move(parts.builds)),
       catalog_(options.limits, &budget_, stores_->keeps() ? &stores_->meshes() : nullptr,
                Clock::System(), [stores = stores_.get()] { return stores->NowS(); }),
       uploads_(options.limits, &catalog_, &stores_->uploads()),
@@ -182,6 +205,8 @@ TissueformServer::TissueformServer(const ServerOptions& options, Parts parts)
       prediction_service_(&gate_, options.limits, &access_, &catalog_, &registry_,
                           &stores_->predictions(), &exports_, &timer_),
       plan_service_(&gate_, &access_, &registry_),
+      plan_build_service_(&gate_, options.limits, &access_, builds_.get(),
+                          !options.cluster.enabled(), pool_.get(), &timer_),
       case_service_(&gate_, options.limits, &access_, &stores_->cases(), pool_.get(), &timer_),
       access_service_(&gate_, &access_changes_, &registry_, &streams_, &watches_,
                       [this] { return stores_->NowS(); }),
@@ -291,6 +316,7 @@ absl::Status TissueformServer::Listen() {
   builder.RegisterService(&deform_service_);
   builder.RegisterService(&prediction_service_);
   builder.RegisterService(&plan_service_);
+  builder.RegisterService(&plan_build_service_);
   builder.RegisterService(&case_service_);
   builder.RegisterService(&access_service_);
   builder.RegisterService(&export_service_);

@@ -19,6 +19,7 @@
 #include "server/access/link_authenticator.h"
 #include "server/app/open_stores.h"
 #include "server/app/server_options.h"
+#include "server/builds/build_room.h"
 #include "server/cluster/cluster.h"
 #include "server/exports/export_queue.h"
 #include "server/exports/export_store.h"
@@ -32,6 +33,7 @@
 #include "server/rpc/export_service.h"
 #include "server/rpc/export_watch.h"
 #include "server/rpc/mesh_service.h"
+#include "server/rpc/plan_build_service.h"
 #include "server/rpc/plan_service.h"
 #include "server/rpc/prediction_service.h"
 #include "server/rpc/server_info_service.h"
@@ -108,7 +110,8 @@ class TissueformServer {
     std::unique_ptr<TokenAuthenticator> tokens;  // null: none are configured
     Authenticator* authenticator = nullptr;      // null: nobody logs in
     OpenedStores opened;
-    std::unique_ptr<Cluster> cluster;  // null without --store
+    std::unique_ptr<Cluster> cluster;   // null without --store
+    std::unique_ptr<BuildRoom> builds;  // null where no plans are built
   };
 
   TissueformServer(const ServerOptions& options, Parts parts);
@@ -142,6 +145,7 @@ class TissueformServer {
   AdmissionControl gate_;
   MemoryBudget budget_;
   std::unique_ptr<Stores> stores_;
+  std::unique_ptr<BuildRoom> builds_;  // null where no plans are built; stores cases
   MeshCatalog catalog_;
   MeshUploads uploads_;
   std::unique_ptr<WorkerPool> pool_;
@@ -156,6 +160,7 @@ class TissueformServer {
   DeformService deform_service_;
   PredictionService prediction_service_;
   PlanService plan_service_;
+  PlanBuildService plan_build_service_;
   CaseService case_service_;
   AccessService access_service_;
   ExportService export_service_;

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 
 #include "core/base/status_macros.h"
 #include "server/store/store_records.h"
@@ -310,6 +311,26 @@ absl::StatusOr<std::set<CaseKey>> AccessQueries::SharedCases(const std::string& 
     shared.insert(
         {.sha256 = std::string(rows.Text(row, 0)), .owner = std::string(rows.Text(row, 1))});
   });
+  return shared;
+}
+
+absl::StatusOr<std::map<ProjectKey, ShareRole>> AccessQueries::SharedProjects(
+    const std::string& principal) {
+  TF_ASSIGN_OR_RETURN(const SqlRows rows,
+                      Ask(database_,
+                          "SELECT owner, resource, record FROM shares WHERE principal = $1 AND "
+                          "resource LIKE 'projects/%'",
+                          {principal}));
+  std::map<ProjectKey, ShareRole> shared;
+  for (size_t row = 0; row < rows.size(); ++row) {
+    const std::string owner(rows.Text(row, 0));
+    const std::string resource(rows.Text(row, 1));
+    const auto role = RoleOf(rows.Text(row, 2), owner, resource, principal);
+    if (role.has_value()) {
+      shared[{.owner = owner, .name = std::string(absl::StripPrefix(resource, "projects/"))}] =
+          *role;
+    }
+  }
   return shared;
 }
 

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -35,6 +36,13 @@ struct PredictionGrant {
 struct CaseGrant {
   CaseKey key = {};
   std::optional<ShareRole> role = {};
+};
+// A project of one owner; others have theirs under the same name.
+struct ProjectKey {
+  std::string owner = {};
+  std::string name = {};
+
+  friend auto operator<=>(const ProjectKey&, const ProjectKey&) = default;
 };
 // A follow link, and what its maker has of its session. Unset: the session is gone.
 struct LinkGrant {
@@ -87,6 +95,7 @@ class AccessQueries {
   absl::StatusOr<std::set<std::string>> SharedSessions(const std::string& principal);
   absl::StatusOr<std::set<std::string>> SharedPredictions(const std::string& principal);
   absl::StatusOr<std::set<CaseKey>> SharedCases(const std::string& principal);
+  absl::StatusOr<std::map<ProjectKey, ShareRole>> SharedProjects(const std::string& principal);
   // Of the predictions named, those that exist: their owners.
   absl::StatusOr<std::set<std::string>> OwnersOfPredictions(const std::set<std::string>& ids);
 

@@ -2,16 +2,18 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """What goes to a cluster through HAProxy: uploads of a stranger's are answered, or refused with the reason, the doctor finds
-nothing, a server that is added is found without a word to anybody, and calls that name 20,000 sessions which nobody has leave
-nothing in a server, nor in HAProxy.
+nothing, what a person sends for a plan is found by all of the person's calls and its case by every server, a server that is added
+is found without any notice, and calls that name 20,000 sessions which nobody has leave nothing in a server, nor in HAProxy.
 
 Exit code 0: so it is. 1: not. 77: PostgreSQL, HAProxy or python3-grpcio is missing.
 """
 
 import argparse
+import base64
 import collections
 import concurrent.futures
 import hashlib
+import json
 import pathlib
 import random
 import struct
@@ -54,6 +56,15 @@ REFUSALS = 50
 MORE_CHUNKS = 200
 EXAMINATIONS = 8
 PATIENCE_S = 30
+# By their logins to two servers: that all go to one is as likely as 1 in 2,048.
+PEOPLE = 12
+LOOKS = 6
+BUILD_S = 120
+# The bundled CT's lower face, so coarse that it takes seconds.
+RECIPE = {"format": "tissueform-recipe", "version": 6, "ct": {"hu_offset": -1024, "axes": "RPI"}, "spacing_mm": 4,
+          "mesh": {"edge_mm": 8, "fine_edge_mm": 8},
+          "region_of_interest": {"above": {"point_mm": [0, 0, -50], "normal": [0, 0, -1]}, "back": {"point_mm": [0, 100, 0], "normal": [0, -1, 0]}},
+          "segments": [{"name": "mandible", "osteotomy": "bssro", "pose": {"translation_mm": [0, -4, 0]}}]}
 
 
 def two_tets():
@@ -118,6 +129,54 @@ def check_doctor(cluster):
         if done.returncode != 0 or "in a cluster)" not in done.stdout:
             raise SystemExit(f"the doctor says of a cluster that is well:\n{done.stdout}{done.stderr}")
     print(f"the doctor finds nothing, {EXAMINATIONS} times", flush=True)
+
+
+def login_of(person):
+    """As HAProxy reads it, which checks no signature; these servers have no logins."""
+    def part(content):
+        return base64.urlsafe_b64encode(json.dumps(content).encode()).rstrip(b"=").decode()
+    return [("authorization", f"Bearer {part({'alg': 'EdDSA'})}.{part({'sub': person})}.c2lnbmF0dXJl")]
+
+
+def check_build_files(channel):
+    """Where files for plans lie: those of a person on one server, those of all on both."""
+    from tissueform.v1 import plan_build_service_pb2 as protocol
+    service = "/tissueform.v1.PlanBuildService"
+    send = channel.stream_unary(f"{service}/UploadBuildFile", request_serializer=protocol.UploadBuildFileRequest.SerializeToString)
+    get = channel.unary_unary(f"{service}/GetBuildFile", request_serializer=protocol.GetBuildFileRequest.SerializeToString)
+    nodes = set()
+    for person in range(PEOPLE):
+        login, content = login_of(f"person {person}"), random.randbytes(1000)
+        sha256 = hashlib.sha256(content).hexdigest()
+        messages = [protocol.UploadBuildFileRequest(header={"sha256": sha256, "suffix": ".nrrd", "total_bytes": len(content)}),
+                    protocol.UploadBuildFileRequest(chunk={"write_offset": 0, "data": content, "finish_write": True})]
+        _, call = send.with_call(iter(messages), timeout=stranger.ATTEMPT_S, metadata=login)
+        calls = [call] + [get.with_call(protocol.GetBuildFileRequest(name=f"buildFiles/{sha256}"), timeout=stranger.ATTEMPT_S, metadata=login)[1]
+                          for _ in range(LOOKS)]
+        held_by = {dict(call.initial_metadata())[stranger.NODE_HEADER] for call in calls}
+        if len(held_by) != 1:
+            raise SystemExit(f"calls of one person for builds went to {held_by}")
+        nodes |= held_by
+    if len(nodes) < 2:
+        raise SystemExit(f"all {PEOPLE} people's calls for builds went to {nodes}")
+    print(f"files of {PEOPLE} people are found, at {', '.join(sorted(nodes))}", flush=True)
+
+
+def check_build(cluster):
+    """A plan that one server builds is a case of all."""
+    recipe = cluster.folder / "recipe.json"
+    recipe.write_text(json.dumps(RECIPE))
+    client = [cluster.programs / "tissueform"]
+    built = subprocess.run(client + ["plan", "build", "--server", cluster.address("workstations"), "--ct", ROOT / "tests/data/ct/headsq/headsq_quarter.nhdr",
+                                     "--recipe", recipe, "--title", "Built in a cluster", "--accept-defects", "--out", cluster.folder / "plan"],
+                           capture_output=True, text=True, timeout=BUILD_S, check=False)
+    if built.returncode != 0:
+        raise SystemExit(f"a cluster builds no plan:\n{built.stdout}{built.stderr}")
+    for node in cluster.nodes:
+        listed = subprocess.run(client + ["case", "list", "--server", cluster.address(node)], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        if "Built in a cluster" not in listed.stdout:
+            raise SystemExit(f"{node} does not know the case that was built:\n{listed.stdout}{listed.stderr}")
+    print(f"a plan was built; its case is known to {', '.join(cluster.nodes)}", flush=True)
 
 
 def check_added(cluster):
@@ -188,6 +247,8 @@ def run(cluster):
         check_uploads(channel)
         check_refusals(channel)
         check_doctor(cluster)
+        check_build_files(channel)
+        check_build(cluster)
         check_added(cluster)
         check_keys(cluster, channel)
 

@@ -1,11 +1,14 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { type Hook, Planner, openCase } from "./planner";
+import { execFileSync } from "node:child_process";
+import { dicomSlice } from "../../client/web/tests/volume/dicom_writer";
+import { timeInPage } from "./ct_input";
+import { type Hook, Planner, openCase, openPage } from "./planner";
 
 // Figures of docs/planner.md: by hand, on a machine that does nothing else.
 //
-//   TISSUEFORM_MEASURE_SECONDS=60 TISSUEFORM_CASE=CASE.tfcase npm --prefix client/web run measure
+//   TISSUEFORM_MEASURE_SECONDS=60 TISSUEFORM_CASE=CASE.tfcase TISSUEFORM_CT=FOLDER npm --prefix client/web run measure
 
 const SECONDS = Number(process.env.TISSUEFORM_MEASURE_SECONDS ?? 60);
 /** 20 Mbit/s, as the network panel of a browser has it. */
@@ -65,6 +68,39 @@ test.each([["loopback", null], ["20 Mbit/s", SLOW]] as const)("first picture ove
   await page.waitForFunction(() => ((globalThis as unknown as Hook).tissueform?.view?.stage.drawnCount ?? 0) > 0);
   console.log(name, await page.evaluate(() => `${Math.round(performance.now())} ms to the first picture`));
 });
+
+test("a cut that is dragged, from its move to the colored pieces", async () => {
+  const ct = process.env.TISSUEFORM_CT;
+  if (ct === undefined) return console.log("set TISSUEFORM_CT to a folder with a CT series to measure its preview");
+  const { page } = await openPage(await planner.browse(), `${planner.url}/#new`);
+  await page.getByLabel("Choose a folder").setInputFiles(ct);
+  await page.locator(".plan-views").waitFor();
+  await page.getByRole("button", { name: "4. Operation" }).click();
+  await page.getByRole("button", { name: "Add", exact: true }).click();
+  await page.getByRole("button", { name: "Set planes" }).click();
+  await page.getByText(/mandible \d+\.\d cm³/).waitFor();
+  const times = (await page.evaluate(dragCut, SECONDS)).sort((a, b) => a - b);
+  console.log(JSON.stringify({ answers: times.length, p50Ms: times[times.length >> 1], p95Ms: times[Math.floor(0.95 * times.length)] }));
+}, 1000 * SECONDS + 120_000);
+
+/** Runs in the page: from each move of a plane to its answer, in ms, each with all that is drawn on the way. */
+async function dragCut(seconds: number): Promise<number[]> {
+  const { draft } = (globalThis as unknown as { tissueform: { draft: any } }).tissueform;
+  const pieces = document.querySelector(".pieces") as HTMLElement;
+  const { id, plane } = draft.planes[0];
+  const times: number[] = [];
+  const end = performance.now() + 1000 * seconds;
+  for (let step = 0; performance.now() < end; ++step) {
+    const begin = performance.now();
+    const answered = new Promise<void>((done) => new MutationObserver((_, observer) => (observer.disconnect(), done())).observe(pieces, { childList: true }));
+    const [x, y, z] = plane.point_mm;
+    draft.movePlane(id, { ...plane, point_mm: [x, y + 10 * Math.sin(step / 10), z] }, false);
+    await answered;
+    await new Promise((drawn) => requestAnimationFrame(drawn));
+    times.push(Math.round(performance.now() - begin));
+  }
+  return times;
+}
 
 /** Runs in the page: until it answers for this model by itself. */
 async function chooseOwnAnswers(name: string) {
@@ -130,4 +166,24 @@ async function collectPauses(session: Tracing): Promise<number[]> {
   await session.send("Tracing.end");
   await complete;
   return pauses;
+}
+
+test("a CT of 600 slices of 512 x 512 is read, and one of 400 by the memory of the page's process", async () => {
+  const noise = Int16Array.from({ length: 512 * 512 }, () => Math.round(2000 * Math.random()) - 1000);
+  const base64 = Buffer.from(dicomSlice(0, { rows: 512, columns: 512, values: noise, texts: { "00200032": ["DS", "-10\\-20\\0000.0"] } })).toString("base64");
+  for (const count of [600, 400]) {
+    const { page } = await openPage(await planner.browse(), planner.url);
+    let mostMiB = 0;
+    const sampling = setInterval(() => (mostMiB = Math.max(mostMiB, rendererMiB())), 200);
+    const result = await page.evaluate(timeInPage, { base64, count });
+    clearInterval(sampling);
+    console.log(JSON.stringify({ ...result, rendererMiB: mostMiB }, null, 1));
+    await page.context().close();
+  }
+}, 300_000);
+
+/** Resident memory of the largest process that draws and computes a page. */
+function rendererMiB(): number {
+  const lines = execFileSync("ps", ["-eo", "rss,args"], { encoding: "utf8", maxBuffer: 2 ** 24 }).split("\n").filter((line) => line.includes("--type=renderer"));
+  return Math.max(0, ...lines.map((line) => Number(line.trim().split(/\s+/)[0]) / 1024));
 }

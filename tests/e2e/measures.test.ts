@@ -210,7 +210,18 @@ describe("the bundled head", () => {
     await moved(page, 6, 10);
     await open(page, "Measures");
     await page.getByRole("button", { name: "Confirm all" }).click();
-    expect(await page.locator(".band").count()).toBe(0);
+    // Of surgery and model, which need no material; as wide as the command says of a lip: some millimeters.
+    await page.getByText("if surgery and model err as published").waitFor();
+    const [lowest, highest] = (await page.locator("[data-measure=e_line_lower_lip] .band").innerText()).replaceAll("−", "-").split(" to ").map(Number);
+    expect(highest - lowest).toBeGreaterThan(3);
+    expect(highest - lowest).toBeLessThan(15);
+    const parts = await page.locator("[data-measure=e_line_lower_lip] th small").last().innerText();
+    const [, surgery, model] = /^of this surgery (\d+\.\d), model (\d+\.\d)$/.exec(parts) ?? [];
+    expect(Math.hypot(Number(surgery), Number(model))).toBeCloseTo((highest - lowest) / 2, 0.6);
+    const exported = JSON.parse(readFileSync(await saveExport(planner, page, "Plan JSON", "tissueform-plan.json"), "utf8"));
+    const measure = exported.measures.find(({ name }: { name: string }) => name === "e_line_lower_lip");
+    expect(measure.interval_of).toBe("surgery and model");
+    expect([measure.lowest_after, measure.highest_after].map((value) => value.toFixed(1))).toEqual([lowest.toFixed(1), highest.toFixed(1)]);
     await page.getByText("Linear elastic", { exact: true }).click();
     await page.locator("[data-measure=e_line_lower_lip] .band").waitFor();
     await expect.poll(() => page.locator("[data-measure=e_line_lower_lip] .band").innerText()).toMatch(/^−?\d+\.\d to −?\d+\.\d$/);
@@ -236,6 +247,7 @@ describe("the bundled head", () => {
     await open(page, "Report");
     await page.getByRole("button", { name: "Open the report" }).click();
     await page.locator(".report").getByRole("row", { name: "Lower lip to E-line" }).getByText(/\d to /).waitFor();
+    await page.locator(".report").getByText("95 % interval: surgery, model and material together").waitFor();
     expect(await page.locator(".report img").evaluateAll((pictures) => pictures.map((picture) => (picture as HTMLImageElement).naturalWidth))).toEqual([480, 480, 480]);
     const pdf = (await page.pdf({ preferCSSPageSize: true })).toString("latin1");
     expect(pdf.match(/\/Type\s*\/Page\b/g)?.length).toBe(1);

@@ -160,6 +160,30 @@ test("measures, a target, the band and the bite", async () => {
   await picture(page, "bite");
 }, 300_000);
 
+test("three plans side by side", async () => {
+  const { page } = await openCase(await planner.browse(), planner);
+  await page.emulateMedia({ colorScheme: "light" });
+  await page.setViewportSize({ width: 1280, height: 900 });
+  await page.getByRole("button", { name: "Left", exact: true }).click();
+  await page.locator("summary").getByText("Measures", { exact: true }).click();
+  await page.getByRole("button", { name: "Confirm all" }).click();
+  await page.getByRole("button", { name: "Side by side" }).click();
+  const plans = page.locator(".side-by-side");
+  await plans.locator(".segments button", { hasText: "Lower jaw" }).click();
+  for (const [plan, mm] of [["B", "4"], ["C", "7"]]) {
+    if (plan === "C") await page.getByRole("button", { name: "Add the plan" }).click();
+    await page.getByRole("region", { name: `Plan ${plan}` }).getByRole("button").click();
+    await typeMove(page, "Forward", mm);
+    await page.getByLabel("Name", { exact: true }).fill(`Jaw ${mm} mm forward`);
+    await page.getByLabel("Name", { exact: true }).press("Enter");
+  }
+  await plans.getByLabel("Color by").selectOption({ label: "Movement of the skin" });
+  await page.getByText("if surgery and model err as published").first().waitFor();
+  await page.locator('[data-row="overjet"], [data-row="largest"]').last().scrollIntoViewIfNeeded();
+  await page.waitForTimeout(600);
+  await page.screenshot({ path: join(FOLDER, "side-by-side.jpg"), type: "jpeg", quality: 90 });
+});
+
 test("the login", async () => {
   const provider = await IdentityProvider.start();
   const house = await Planner.start(process.env.TISSUEFORM_CASE, { gateway: provider.gatewayOptions, server: provider.serverOptions });

@@ -101,7 +101,7 @@ describe("a planner", () => {
     await page.locator(".legend").waitFor({ state: "visible" });
     const { legend } = await state(page);
     expect(legend?.largestMm).toBeGreaterThan(6);
-    await page.locator(".legend").getByText(/^largest \d+\.\d\d mm, 95 % interval \d+\.\d\d to \d+\.\d\d$/).waitFor();
+    await page.locator(".legend").getByText(/^largest \d+\.\d\d mm, 95 % interval \(stiffness only\) \d+\.\d\d to \d+\.\d\d$/).waitFor();
     expect(legend?.mostMm).toBeGreaterThanOrEqual(legend?.largestMm ?? Infinity);
     await page.getByLabel("Color by").selectOption({ label: "Difference to Gradient field" });
     await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.map.legend.value?.title === "Difference to Gradient field");

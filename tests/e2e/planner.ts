@@ -12,15 +12,15 @@ import { type Browser, type BrowserContext, type BrowserContextOptions, type Pag
 // Everything as a user has it: server, gateway and planner as they were built, Debian's Chromium, loopback.
 
 const SOURCE = fileURLToPath(new URL("../..", import.meta.url));
-const BIN = join(process.env.TISSUEFORM_BUILD_DIR ?? join(SOURCE, "build/release"), "bin");
+export const BIN = join(process.env.TISSUEFORM_BUILD_DIR ?? join(SOURCE, "build/release"), "bin");
 const WEB = process.env.TISSUEFORM_WEB_DIR ?? join(SOURCE, "build/web");
-const CHROMIUM = process.env.TISSUEFORM_CHROMIUM ?? "/usr/bin/chromium";
+export const CHROMIUM = process.env.TISSUEFORM_CHROMIUM ?? "/usr/bin/chromium";
 const START_MS = 20_000;
 
 /** What the page's test hook holds; see client/web/src/main.ts. */
 export type Hook = { tissueform: { bench: any; follower: any; view: any } };
 
-/** A program that prints "listening on ADDRESS" when it is ready. */
+/** A program that prints "listening on ADDRESS", or "receiving on", when it is ready. */
 export class Program {
   private constructor(
     private readonly child: ChildProcess,
@@ -37,7 +37,7 @@ export class Program {
       child.stderr?.on("data", (chunk: Buffer) => (errors = (errors + chunk.toString()).slice(-4000)));
       child.stdout?.on("data", (chunk: Buffer) => {
         out += chunk.toString();
-        const match = /listening on (\S+)/.exec(out);
+        const match = /(?:listening|receiving) on (\S+)/.exec(out);
         if (match === null) return;
         clearTimeout(timer);
         accept(new Program(child, match[1]));

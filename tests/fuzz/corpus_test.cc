@@ -66,7 +66,8 @@ INSTANTIATE_TEST_SUITE_P(
         Target{"socket_frame", FuzzSocketFrame}, Target{"web_request", FuzzWebRequest},
         Target{"gateway_connection", FuzzGatewayConnection}, Target{"token", FuzzToken},
         Target{"token_keys", FuzzTokenKeys}, Target{"multipart", FuzzMultipart},
-        Target{"instance_header", FuzzInstanceHeader}),
+        Target{"instance_header", FuzzInstanceHeader}, Target{"zip", FuzzZip},
+        Target{"transform", FuzzTransform}, Target{"markups", FuzzMarkups}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

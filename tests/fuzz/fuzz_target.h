@@ -93,4 +93,14 @@ void FuzzMultipart(const uint8_t* data, size_t size);
 // A DICOM file as the PACS bridge reads it (ReadInstanceHeader).
 void FuzzInstanceHeader(const uint8_t* data, size_t size);
 
+// A zip (ReadZip): nothing is written outside its folder or beyond the limits. The bytes are a name
+// in a zip as well (PartsOfZipName).
+void FuzzZip(const uint8_t* data, size_t size);
+
+// The text of an ITK transform file (ParseItkTransform): what is accepted is rigid.
+void FuzzTransform(const uint8_t* data, size_t size);
+
+// The text of a markups file of 3D Slicer (ParseMarkups).
+void FuzzMarkups(const uint8_t* data, size_t size);
+
 }  // namespace tissueform::fuzz

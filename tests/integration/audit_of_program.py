@@ -6,12 +6,13 @@
   audit_of_program.py collector SERVER TISSUEFORM    rsyslog receives them over TLS
   audit_of_program.py journal SERVER TISSUEFORM      systemd-journald keeps them, journalctl prints them
   audit_of_program.py bridge TISSUEFORM_PACS         storescu sends to the bridge, rsyslog receives its DICOM audit messages, and
-                                                     xmllint checks them against the schema
+                                                     xmllint checks them against the schema; strangers and users come to it
 
 The journal's part runs in namespaces of its own, in which journald has an empty /run. Exit code 77: a program is missing, or
 the machine allows no such namespaces.
 """
 
+import base64
 import contextlib
 import json
 import os
@@ -24,10 +25,13 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
+import urllib.request
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 PATIENCE_S = 60
 JOURNALD = "/lib/systemd/systemd-journald"
-SCHEMA = pathlib.Path(__file__).resolve().parents[1] / "client/pacs_bridge/audit/audit_message.rng"
+SCHEMA = ROOT / "tests/client/pacs_bridge/audit/audit_message.rng"
 OBJECT = """
 (0008,0016) UI [1.2.840.10008.5.1.4.1.1.2]
 (0008,0018) UI [1.2.3.3]
@@ -206,6 +210,43 @@ def look_at_bridge(program, folder):
     end(collector.process)
 
 
+def ask_review_page(address, user, password):
+    """The status of the page's answer."""
+    told = base64.b64encode(f"{user}:{password}".encode()).decode()
+    try:
+        return urllib.request.urlopen(urllib.request.Request(address, headers={"Authorization": f"Basic {told}"}), timeout=PATIENCE_S).status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def look_at_visitors(program, folder):
+    """Strangers at the receiver, and users and strangers at the review page."""
+    collector = Rsyslog(folder)
+    (folder / "password").touch(mode=0o600)
+    (folder / "password").write_text("correct horse battery staple\n")
+    bridge = start(program, "run", "--state-dir", folder / "visited", "--listen", "127.0.0.1:0", "--allow-ae", "SCANNER", "--log-level", "warn",
+                   "--server", "127.0.0.1:1", "--recipe", ROOT / "deploy/pacs/recipe.json", "--review-listen", "127.0.0.1:0", "--review-token-file", folder / "password",
+                   "--audit", f"syslog://localhost:{collector.port}", "--audit-ca", folder / "ca.pem",
+                   "--dicom-cert", folder / "server.pem", "--dicom-key", folder / "server.key", "--dicom-ca", folder / "ca.pem", stdout=subprocess.PIPE, text=True)
+    port = bridge.stdout.readline().strip().rsplit(":", 1)[1]
+    page = bridge.stdout.readline().split()[-1]
+    subprocess.run(["echoscu", "--enable-tls", folder / "collector.key", folder / "collector.pem", "--add-cert-file", folder / "ca.pem", "-aet", "STRANGER",
+                    "-aec", "TISSUEFORM", "localhost", port], capture_output=True, check=False)
+    # The receiver and the page record from two threads: without this wait the login may be first.
+    wait_for("rsyslog has the stranger", lambda: any('UserID="STRANGER"' in event["text"] for event in collector.events("tissueform-pacs")))
+    check([ask_review_page(page, "ada", "correct horse battery staple") for _ in range(3)] == [200, 200, 200], "the review page takes its password")
+    check({ask_review_page(page, "eve", "a guess") for _ in range(20)} == {401}, "and no other")
+    check(end(bridge) == 0, "the bridge ends")
+    wait_for("rsyslog has the stop", lambda: any('csd-code="110121"' in event["text"] for event in collector.events("tissueform-pacs")))
+    texts = [event["text"] for event in collector.events("tissueform-pacs")][1:-1]
+    found = [(re.search(r'<EventID csd-code="(\d+)"', text)[1], re.search(r'UserID="([^"]*)"', text)[1], re.search('OutcomeIndicator="(.)"', text)[1]) for text in texts]
+    # A refusal of the receiver and four of the page are five from this address; the last event has the number of the others.
+    check(found[:2] == [("110113", "STRANGER", "8"), ("110114", "ada", "0")], "a stranger and a login are recorded once", found)
+    check(found[2:-1] == [("110114", "eve", "8")] * 4 and "16 more refusals" in texts[-1], "guesses are recorded up to the limit, and counted beyond", found)
+    check("staple" not in "".join(texts) and "guess" not in "".join(texts), "without a password")
+    end(collector.process)
+
+
 def look_at_refusals(programs, folder):
     for options, reason in ((("--audit-log", "audit.jsonl"), "--audit-log: removed; give --audit journal or --audit syslog://HOST:PORT"),
                             (("--audit-syslog",), "--audit-syslog: removed; give"),
@@ -252,7 +293,7 @@ def look_at_journal(programs, folder):
 
 def main():
     kind, programs = sys.argv[1], sys.argv[2:]
-    needed = {"bridge": ["/usr/sbin/rsyslogd", "openssl", "dump2dcm", "storescu", "xmllint"], "collector": ["/usr/sbin/rsyslogd", "openssl"],
+    needed = {"bridge": ["/usr/sbin/rsyslogd", "openssl", "dump2dcm", "storescu", "echoscu", "xmllint"], "collector": ["/usr/sbin/rsyslogd", "openssl"],
               "journal": [JOURNALD, "journalctl", "unshare"]}[kind]
     if any(shutil.which(program) is None for program in needed):
         print(f"missing: one of {needed}; deploy/packages.txt lists them")
@@ -270,6 +311,7 @@ def main():
                 look_at_journal(programs, folder)
             elif kind == "bridge":
                 look_at_bridge(programs[0], folder)
+                look_at_visitors(programs[0], folder)
             else:
                 look_at_refusals(programs, folder)
                 look_at_collector(programs, folder)

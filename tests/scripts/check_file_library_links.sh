@@ -11,7 +11,7 @@ set -euo pipefail
 
 program=${1:?usage: check_file_library_links.sh PROGRAM}
 libraries=$(ldd "$program")
-if grep -iE 'libvtk|libITK|libdcm|libgdcm|libgmsh|libtet|libCGAL|libhdf5|libexpat' <<<"$libraries"; then
+if grep -iE 'libvtk|libITK|libdcm|libgdcm|libgmsh|libtet|libCGAL|libhdf5|libexpat|libzip' <<<"$libraries"; then
   echo "check_file_library_links.sh: $program is linked with a file library (see above)" >&2
   exit 1
 fi

@@ -13,6 +13,7 @@ are there. Exit code 0 when all is so.
 """
 
 import argparse
+import os
 import pathlib
 import re
 import shutil
@@ -23,8 +24,8 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
-def run(*words, cwd=None):
-    done = subprocess.run([str(word) for word in words], cwd=cwd, capture_output=True, text=True)
+def run(*words, env=None):
+    done = subprocess.run([str(word) for word in words], env=env, capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(str(word) for word in words)}: exit code {done.returncode}\n"
                            f"{done.stdout[-2000:]}{done.stderr[-4000:]}")
@@ -84,7 +85,7 @@ def check_programs(prefix, scratch):
 
 def check_example(prefix, scratch):
     source, build = prefix / "share/doc/tissueform/examples/drag", scratch / "example"
-    run("cmake", "-S", source, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=Release")
+    run("cmake", "-S", source, "--preset", "release", "-B", build, env=os.environ | {"TISSUEFORM_PREFIX": str(prefix)})
     run("cmake", "--build", build)
     server = subprocess.Popen([prefix / "bin/tissueform-server", "--in-memory", "--port", "0"], stdout=subprocess.PIPE,
                               stderr=subprocess.DEVNULL, text=True)

@@ -21,6 +21,7 @@ declare -A corpora=([FuzzPlan]=plan [FuzzMeshValidation]=mesh_validation [FuzzMe
   [FuzzDisplacements]=displacements [FuzzStoreRecord]=store_record [FuzzDeformStream]=deform_stream [FuzzCaseFile]=case_file
   [FuzzCaseUpload]=case_upload [FuzzAnswers]=answers [FuzzSocketFrame]=socket_frame [FuzzWebRequest]=web_request
   [FuzzMultipart]=multipart [FuzzInstanceHeader]=instance_header
+  [FuzzZip]=zip [FuzzTransform]=transform [FuzzMarkups]=markups
   [FuzzGatewayConnection]=gateway_connection)
 
 cmake -S . -B "$build_dir" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1" \

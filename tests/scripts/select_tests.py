@@ -96,7 +96,7 @@ def rule_of(path):
     """"source", "web", "python", "text", "scripts", "tests" (a file that belongs to the tests of its folder), or "everything"."""
     if path.startswith("client/web/"):
         return "web"
-    if path.startswith("client/python/"):
+    if path.startswith(("client/python/", "client/slicer/")):
         return "python"
     if TEXT.search(path):
         return "text"
@@ -115,7 +115,7 @@ def is_selected(entry, rules, sources, links, reads_docs):
         return True
     if rules.get("web") and (entry.needs_planner or entry.name.startswith(("client_web.", "e2e."))):
         return True
-    if rules.get("python") and entry.name.startswith("client_python."):
+    if rules.get("python") and entry.name.startswith(("client_python.", "client_slicer.")):
         return True
     if any(str(pathlib.PurePosixPath(path).parent) == entry.folder for path in rules.get("tests", ())):
         return True

@@ -67,6 +67,7 @@ class Select(unittest.TestCase):
     def test_the_planner_leaves_core_alone(self):
         self.assertEqual(selected("client/web/src/main.ts"), [COMMAND, WEB, BROWSER, STYLE])
         self.assertEqual(selected("client/python/tissueform/drag.py"), [PYTHON, STYLE])
+        self.assertEqual(selected("client/slicer/Tissueform/Tissueform/Tissueform.py"), [PYTHON, STYLE])
 
     def test_the_page_has_the_evaluator_of_core(self):
         self.assertEqual(selected("core/mechanics/answer_evaluator/answer_bytes.cc"), [COMMAND, WEB, BROWSER, CHAOS, STYLE, LINKS])

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <fcntl.h>
 #include <fstream>
 #include <regex>
@@ -49,8 +50,8 @@ void LimitFileSize(int64_t max_file_bytes) {
 
 }  // namespace
 
-ProcessResult RunTissueform(const std::vector<std::string>& arguments,
-                            const std::filesystem::path& folder, int64_t max_file_bytes) {
+ProcessResult RunCommandLine(const std::vector<std::string>& arguments,
+                             const std::filesystem::path& folder, int64_t max_file_bytes) {
   const std::string program = ProgramPath("tissueform");
   std::vector<char*> argv = {const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
@@ -89,6 +90,20 @@ void CliTest::Write(const std::string& name, const std::string& contents) const 
 }
 
 std::string CliTest::Read(const std::string& name) const { return BytesOfFile(folder_ / name); }
+
+std::string CliTest::SchemaFindings(const std::string& schema, const std::string& name,
+                                    const std::vector<std::string>& optional) const {
+  // Debian's Python has the modules of deploy/packages.txt; another may come first in PATH.
+  std::string command = "/usr/bin/python3 -B " + SourcePath("tests/testing/check_schema.py") + " " +
+                        SourcePath("docs/" + schema) + " " + Path(name);
+  for (const std::string& object : optional) command += " --optional '" + object + "'";
+  const std::string findings = folder_.string() + ".findings";
+  const int status = std::system((command + " > " + findings + " 2>&1").c_str());
+  const std::string text = BytesOfFile(findings);
+  std::filesystem::remove(findings);
+  if (status == 0) return "";
+  return text.empty() ? "check_schema.py did not run" : text;
+}
 
 std::vector<std::string> CliTest::Files() const {
   std::vector<std::string> names;

@@ -22,8 +22,8 @@ struct ProcessResult {
 
 // Runs the program that is tested, in `folder`. With a limit it cannot write files beyond that
 // size, as on a full disk.
-ProcessResult RunTissueform(const std::vector<std::string>& arguments,
-                            const std::filesystem::path& folder, int64_t max_file_bytes = -1);
+ProcessResult RunCommandLine(const std::vector<std::string>& arguments,
+                             const std::filesystem::path& folder, int64_t max_file_bytes = -1);
 
 // Exit code 1 or 2, nothing on stdout unless allowed, and exactly one line on stderr that starts
 // with "tissueform: ".
@@ -46,11 +46,16 @@ class CliTest : public ::testing::Test {
   void TearDown() override;
 
   ProcessResult Run(const std::vector<std::string>& arguments) const {
-    return RunTissueform(arguments, folder_);
+    return RunCommandLine(arguments, folder_);
   }
   std::string Path(const std::string& name) const { return (folder_ / name).string(); }
   void Write(const std::string& name, const std::string& contents) const;
   std::string Read(const std::string& name) const;
+  // What check_schema.py finds of a file here and a schema of docs, "outcome.schema.json"; nothing
+  // where the file follows it and the schema refuses each damage. Keys of `optional` objects may
+  // be missing.
+  std::string SchemaFindings(const std::string& schema, const std::string& name,
+                             const std::vector<std::string>& optional = {}) const;
   // Names of all files in the folder, sorted.
   std::vector<std::string> Files() const;
   // Puts bar.vtu, the mesh of the bundled plan, into the folder.

@@ -4,7 +4,6 @@
 #include "client/cli/cases/packed_case.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -28,25 +27,10 @@
 namespace tissueform {
 namespace {
 
-namespace fs = std::filesystem;
-
 // Of the segments, for a folder may be named after a patient.
 std::string TitleOf(const CaseFile& contents) {
   const auto add_label = [](std::string* text, const CaseHandle& h) { *text += h.label; };
   return absl::StrJoin(contents.handles, ", ", add_label).substr(0, 256);
-}
-
-// What lies beside the mesh and belongs to it. Nothing where there is none.
-absl::StatusOr<std::optional<ViewerFile>> FindViewer(const std::string& mesh_path) {
-  const fs::path path = fs::path(mesh_path).parent_path() / kViewerFile;
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) return std::nullopt;
-  TF_ASSIGN_OR_RETURN(ViewerFile viewer, ReadViewer(path.string()));
-  TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256(mesh_path));
-  if (viewer.mesh_file_sha256 == mesh_sha256) return viewer;
-  return absl::FailedPreconditionError(
-      absl::StrCat(path.string(), " belongs to a different mesh than ", mesh_path,
-                   "; build the plan again, or remove the file to show only the mesh"));
 }
 
 MeshPayloadView PayloadOf(const CaseMesh& mesh) {
@@ -61,7 +45,7 @@ absl::StatusOr<OpenedPlan> OpenPlan(const std::string& plan_path, const PlanRead
   TF_ASSIGN_OR_RETURN(const std::string text, ReadJsonText(plan_path, "plan", kMaxPlanBytes));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(plan_path, reading));
   TF_ASSIGN_OR_RETURN(PlanProblem problem, ResolvePlan(plan, reading.resolve));
-  TF_ASSIGN_OR_RETURN(std::optional<ViewerFile> viewer, FindViewer(plan.mesh_path));
+  TF_ASSIGN_OR_RETURN(std::optional<ViewerFile> viewer, FindViewerOf(plan.mesh_path));
   CaseFile about;
   about.title = title;
   about.software = absl::StrCat("tissueform ", SoftwareVersion());

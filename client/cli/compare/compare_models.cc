@@ -176,7 +176,7 @@ absl::Status WriteResults(const CompareOptions& options, const ModelComparison& 
     AddDifferenceArrays(reference, positions, &with_arrays.point_data);
     TF_RETURN_IF_ERROR(WriteResult(ResultPath(options, result.model), comparison.plan, with_arrays,
                                    result.deformation.positions,
-                                   result.band ? &*result.band : nullptr));
+                                   {.material = result.band ? &*result.band : nullptr}));
   }
   return absl::OkStatus();
 }

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <fcntl.h>
+#include <poll.h>
 #include <unistd.h>
 
 namespace tissueform {
@@ -53,6 +54,11 @@ EndingSignals::~EndingSignals() {
   noted_by_handler = -1;
   close(arrived_);
   close(noted_);
+}
+
+bool EndingSignals::arrived() const {
+  pollfd asked = {.fd = arrived_, .events = POLLIN, .revents = 0};
+  return poll(&asked, 1, 0) == 1;
 }
 
 void EndingSignals::EndByArrived() const {

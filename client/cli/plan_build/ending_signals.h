@@ -25,6 +25,9 @@ class EndingSignals {
   // Readable when one has arrived.
   int descriptor() const { return arrived_; }
 
+  // Whether one has arrived. Any thread.
+  bool arrived() const;
+
   // Ends this process as one that a signal has told to end, with exit code 128 + signal and without
   // any clearing up. REQUIRES: one has arrived.
   [[noreturn]] void EndByArrived() const;

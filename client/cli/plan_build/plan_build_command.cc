@@ -15,6 +15,7 @@
 #include <sys/resource.h>
 
 #include "client/cli/plan_build/ending_signals.h"
+#include "client/cli/plan_build/plan_build_inputs.h"
 #include "client/cli/plan_build/stage_times.h"
 #include "client/cli/shared/version.h"
 #include "core/base/atomic_file.h"
@@ -27,15 +28,10 @@ namespace tissueform {
 namespace {
 
 struct PlanBuildArguments {
-  std::string ct;
-  std::string recipe;
-  std::string surfaces;
-  std::string labels;
-  std::string out;
+  PlanBuildInputs inputs;
   std::string stats;
   int threads = 0;
   bool no_pictures = false;
-  bool accept_defects = false;
 };
 
 // The folder appears all at once, and holds no times: they go elsewhere.
@@ -43,7 +39,7 @@ absl::Status CheckStatsFile(const PlanBuildArguments& arguments) {
   if (arguments.stats.empty()) return absl::OkStatus();
   namespace fs = std::filesystem;
   std::error_code error;
-  const fs::path out = fs::weakly_canonical(fs::absolute(arguments.out, error), error);
+  const fs::path out = fs::weakly_canonical(fs::absolute(arguments.inputs.out, error), error);
   const fs::path inside =
       fs::weakly_canonical(fs::absolute(arguments.stats, error), error).lexically_relative(out);
   if (!inside.empty() && *inside.begin() != "..") {
@@ -78,15 +74,15 @@ absl::Status WriteStatsFile(const std::string& path, const StageTimes& times, in
 // All or nothing: when it has returned an error nothing is left.
 absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& arguments,
                                                 const EndingSignals& signals) {
-  TF_ASSIGN_OR_RETURN(AtomicFolder folder, AtomicFolder::Create(arguments.out));
+  TF_ASSIGN_OR_RETURN(AtomicFolder folder, AtomicFolder::Create(arguments.inputs.out));
   StageTimes times;
   TF_ASSIGN_OR_RETURN(PlanBuildAnswer made,
-                      CallPlanBuild({.ct = arguments.ct,
-                                     .recipe = arguments.recipe,
-                                     .surfaces = arguments.surfaces,
-                                     .labels = arguments.labels,
+                      CallPlanBuild({.ct = arguments.inputs.ct,
+                                     .recipe = arguments.inputs.recipe,
+                                     .surfaces = arguments.inputs.surfaces,
+                                     .labels = arguments.inputs.labels,
                                      .folder = folder.path(),
-                                     .folder_name = arguments.out,
+                                     .folder_name = arguments.inputs.out,
                                      .threads = arguments.threads,
                                      .pictures = !arguments.no_pictures},
                                     {.tell = [&times](absl::string_view stage,
@@ -100,16 +96,8 @@ absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& argume
   return made;
 }
 
-// The folder is kept: its report shows what is wrong, and it may be enough for what is asked.
-absl::Status CheckReady(const PlanBuildArguments& arguments, const PlanBuildAnswer& made) {
-  if (made.ready || arguments.accept_defects) return absl::OkStatus();
-  return absl::FailedPreconditionError(
-      absl::StrCat("the plan in ", arguments.out, " is not ready: ", made.defects, "; see ",
-                   arguments.out, "/report.html, or pass --accept-defects to continue"));
-}
-
 absl::Status RunPlanBuild(PlanBuildArguments arguments) {
-  TF_RETURN_IF_ERROR(CheckFillable(arguments.out));
+  TF_RETURN_IF_ERROR(CheckFillable(arguments.inputs.out));
   TF_RETURN_IF_ERROR(CheckStatsFile(arguments));
   if (arguments.threads == 0) arguments.threads = AvailableProcessors();
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<EndingSignals> signals, EndingSignals::Catch());
@@ -117,7 +105,7 @@ absl::Status RunPlanBuild(PlanBuildArguments arguments) {
   if (absl::IsCancelled(outcome.status())) signals->EndByArrived();
   TF_RETURN_IF_ERROR(outcome.status());
   absl::PrintF("%s", outcome->text);
-  return CheckReady(arguments, *outcome);
+  return CheckReady(arguments.inputs, outcome->ready, outcome->defects);
 }
 
 constexpr char kFooter[] =
@@ -138,8 +126,21 @@ constexpr char kFooter[] =
     "  tissueform plan build --ct head.nrrd --recipe recipe.json --out head --no-pictures\n"
     "  tissueform plan build --surfaces surfaces.json --out head\n"
     "  tissueform plan build --ct series/ --labels bones.seg.nrrd --recipe recipe.json --out head\n"
+    "  tissueform plan build --ct cd.zip --recipe recipe.json --out head\n"
+    "  tissueform plan build --server HOST:PORT --ct series/ --recipe recipe.json --out head\n"
+    "Bone pieces as surfaces, transforms and markups of 3D Slicer: docs/bring-your-own.md.\n"
     "Exit codes: 0 done, 1 the work failed or the plan is not ready, 2 wrong use, 128 + signal "
     "when ended by one.";
+
+// Only for the help: with this word main() leaves the command to the program that speaks with
+// servers.
+void AddServerWord(CLI::App* build) {
+  build
+      ->add_option(
+          "--server",
+          "build on this server; its options: tissueform plan build --server HOST:PORT --help")
+      ->type_name("HOST:PORT");
+}
 
 }  // namespace
 
@@ -147,31 +148,8 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
   auto arguments = std::make_shared<PlanBuildArguments>();
   CLI::App* build =
       app.add_subcommand("build", "build a plan from a CT of a head, or from its surfaces");
-  auto* ct = build->add_option(
-      "--ct", arguments->ct,
-      "folder of a DICOM series, a study or a CD, or a DICOM file, or a volume (.nii "
-      ".nii.gz .nrrd "
-      ".nhdr .mha .mhd)");
-  auto* recipe =
-      build->add_option("--recipe", arguments->recipe, "the recipe (docs/recipe-format.md)");
-  ct->needs(recipe);
-  recipe->needs(ct);
-  auto* input = build->add_option_group("input", "a CT with a recipe, or surfaces");
-  input->add_options(ct);
-  input
-      ->add_option("--surfaces", arguments->surfaces,
-                   "instead of a CT and a recipe: JSON file that names the surfaces of skin and "
-                   "bones (docs/bring-your-own.md)")
-      ->excludes(recipe);
-  input->require_option(1);
-  build
-      ->add_option("--labels", arguments->labels,
-                   "label map of this CT (.seg.nrrd .nrrd .nii .nii.gz .mha or DICOM SEG); its "
-                   "bones, teeth and hollows take the place of what thresholds find "
-                   "(docs/bring-your-own.md)")
-      ->needs(ct);
-  build->add_option("--out", arguments->out, "folder for the plan: a new or an empty one")
-      ->required();
+  AddPlanBuildInputs(build, &arguments->inputs);
+  AddServerWord(build);
   build
       ->add_option("--threads", arguments->threads,
                    "threads (default 0: one per processor); does not affect the "
@@ -181,9 +159,6 @@ void AddPlanBuildCommand(CLI::App& app, CommandWork* work) {
                     "JSON file for the seconds of every stage and the memory; not in DIR");
   build->add_flag("--no-pictures", arguments->no_pictures,
                   "report without pictures: needs no display and no Xvfb");
-  build->add_flag("--accept-defects", arguments->accept_defects,
-                  "exit code 0 even if the plan misses a quality requirement; the report still "
-                  "states that it is not ready");
   build->footer(kFooter);
   build->callback([arguments, work] { *work = [arguments] { return RunPlanBuild(*arguments); }; });
 }

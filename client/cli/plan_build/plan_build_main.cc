@@ -13,8 +13,10 @@
 #include "client/cli/shared/version.h"
 #include "core/base/status_macros.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
+#include "core/planning/plan_building/build_inputs.h"
 #include "core/planning/plan_building/plan_build_call.h"
 #include "core/planning/plan_building/plan_builder.h"
+#include "core/planning/plan_building/zip_inputs.h"
 #include "core/planning/plan_report/cautions.h"
 #include "core/planning/plan_report/labels_report.h"
 #include "core/planning/plan_report/plan_measures.h"
@@ -73,25 +75,55 @@ absl::StatusOr<Recipe> RecipeOf(const PlanBuildRequest& request) {
   return recipe;
 }
 
+// The request with zips replaced by what they hold.
+absl::StatusOr<std::string> ResolveCt(const PlanBuildRequest& request, ZipInputs* zips,
+                                      Recipe* recipe) {
+  if (!recipe->labels.file.empty()) {
+    TF_ASSIGN_OR_RETURN(recipe->labels.file,
+                        zips->Resolve(recipe->labels.file, ZipContent::kLabels));
+  }
+  return zips->Resolve(request.ct, ZipContent::kCt);
+}
+
 absl::StatusOr<PlanBuild> BuildFromInput(const PlanBuildRequest& request,
                                          const StageFunction& tell) {
   const PlanBuildOptions options{.threads = request.threads, .tell = Within(tell, 0, kBuildShare)};
-  if (!request.surfaces.empty()) return BuildPlanFromSurfaces(request.surfaces, options);
-  TF_ASSIGN_OR_RETURN(const Recipe recipe, RecipeOf(request));
-  return BuildPlan(request.ct, recipe, options);
+  // Whoever called removes the folder after an error, also when this process is killed.
+  ZipInputs zips(request.folder);
+  if (!request.surfaces.empty()) {
+    TF_ASSIGN_OR_RETURN(const std::string surfaces,
+                        zips.Resolve(request.surfaces, ZipContent::kSurfaces));
+    return BuildPlanFromSurfaces(surfaces, options);
+  }
+  TF_ASSIGN_OR_RETURN(Recipe recipe, RecipeOf(request));
+  TF_ASSIGN_OR_RETURN(const std::string ct, ResolveCt(request, &zips, &recipe));
+  return BuildPlan(ct, recipe, options);
 }
 
 absl::StatusOr<PlanBuildAnswer> CompareRequestedLabels(const PlanBuildRequest& request,
                                                        const StageFunction& tell) {
-  TF_ASSIGN_OR_RETURN(const Recipe recipe, RecipeOf(request));
+  ZipInputs zips(request.folder);
+  TF_ASSIGN_OR_RETURN(Recipe recipe, RecipeOf(request));
+  TF_ASSIGN_OR_RETURN(const std::string ct, ResolveCt(request, &zips, &recipe));
   TF_ASSIGN_OR_RETURN(const PlanLabels labels,
-                      CompareWithLabels(request.ct, recipe, {request.threads, tell}));
+                      CompareWithLabels(ct, recipe, {request.threads, tell}));
   return PlanBuildAnswer{.text = LabelsText(labels), .ready = true, .defects = {}};
+}
+
+absl::StatusOr<PlanBuildAnswer> WriteRequestedInputs(const PlanBuildRequest& request,
+                                                     const StageFunction& tell) {
+  tell("reading the inputs", 0);
+  ZipInputs zips(request.folder);
+  TF_ASSIGN_OR_RETURN(const std::vector<std::string> notes, WriteBuildInputs(request, &zips));
+  PlanBuildAnswer made{.text = {}, .ready = true, .defects = {}};
+  for (const std::string& note : notes) absl::StrAppend(&made.text, "CT      ", note, "\n");
+  return made;
 }
 
 absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& request,
                                                    const StageFunction& tell) {
   if (request.only_compare_labels) return CompareRequestedLabels(request, tell);
+  if (request.only_write_inputs) return WriteRequestedInputs(request, tell);
   // As deform does: the last digits would depend on their number, and with them what the trial of
   // the planned move finds torn. Threads that wait for each other also cost more than they give.
   SetBlasThreads(1);

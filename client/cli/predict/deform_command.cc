@@ -31,6 +31,7 @@ struct DeformOptions {
   std::string out;
   std::string model;
   std::string stats;
+  std::string deviations;
   bool seal = false;
   int threads = AvailableProcessors();
   int solver_threads = 1;
@@ -39,6 +40,12 @@ struct DeformOptions {
 absl::Status CheckOutputs(const DeformOptions& options) {
   TF_RETURN_IF_ERROR(CheckWritable(options.out));
   return options.stats.empty() ? absl::OkStatus() : CheckWritable(options.stats);
+}
+
+// As published where no file is named.
+absl::StatusOr<Deviations> ChosenDeviations(const DeformOptions& options) {
+  if (options.deviations.empty()) return Deviations();
+  return ReadDeviations(options.deviations);
 }
 
 absl::StatusOr<Plan> ReadChosenPlan(const DeformOptions& options) {
@@ -91,7 +98,8 @@ absl::StatusOr<Deformation> Solve(Deformer* deformer, absl::Span<const HandlePos
 }
 
 // Fills `stats` as far as preparing and solving know it.
-absl::StatusOr<Positions> Predict(const PlanProblem& problem, bool seal, PredictionStats* stats) {
+absl::StatusOr<Positions> Predict(const PlanProblem& problem, bool seal,
+                                  const Deviations& deviations, PredictionStats* stats) {
   std::shared_ptr<MeshPreparation> preparation;
   std::unique_ptr<Deformer> deformer;
   {
@@ -110,7 +118,16 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, bool seal, Predict
   stats->contact = SummarizeContact(deformation.contact, problem.deformer.model);
   stats->seal = deformation.seal;
   stats->quality = MeasureDeformation(*problem.mesh, deformation.positions);
-  stats->band = FindMaterialBandOrWarn(problem, deformation.positions, std::move(preparation));
+  if (deformation.seal && !deformation.seal->released) {
+    WarnOfMissingBand(problem, "it is not known of sealed lips");
+    return std::move(deformation.positions);
+  }
+  stats->band = FindMaterialBandOrWarn(problem, deformation.positions, preparation);
+  if (TraitsOf(problem.deformer.model).is_elastic) {
+    TF_ASSIGN_OR_RETURN(stats->total_band,
+                        FindTotalBand(problem, deformation.positions, preparation.get(),
+                                      stats->band ? &stats->band->expansion : nullptr, deviations));
+  }
   return std::move(deformation.positions);
 }
 
@@ -118,6 +135,7 @@ absl::Status RunDeform(const DeformOptions& options) {
   TF_RETURN_IF_ERROR(CheckOutputs(options));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
   TF_RETURN_IF_ERROR(CheckSeal(options, plan));
+  TF_ASSIGN_OR_RETURN(const Deviations deviations, ChosenDeviations(options));
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(PlanProblem problem,
                       ResolveWithProgress(plan, options.reading.resolve, &read_seconds));
@@ -126,9 +144,11 @@ absl::Status RunDeform(const DeformOptions& options) {
   PredictionStats stats = StatsOf(problem);
   stats.solver_threads = options.solver_threads;
   stats.read_seconds = read_seconds;
-  TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, options.seal, &stats));
+  TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, options.seal, deviations, &stats));
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed,
-                                 stats.band ? &*stats.band : nullptr, stats.seal));
+                                 {.material = stats.band ? &*stats.band : nullptr,
+                                  .total = stats.total_band ? &*stats.total_band : nullptr},
+                                 stats.seal));
   if (!options.stats.empty()) {
     stats.elastic = SummarizeElastic(problem, deformed);
     TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
@@ -152,6 +172,11 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
       ->check(CLI::IsMember(KnownModelNames()));
   command->add_option("--stats", options->stats,
                       "also write counts, times and quality to this JSON file");
+  command
+      ->add_option("--deviations", options->deviations,
+                   "JSON file of what surgery and model err by, in place of the published figures\n"
+                   "(docs/accuracy.md, \"The whole band\")")
+      ->check(CLI::ExistingFile);
   command
       ->add_option("--threads", options->threads, "number of threads; does not affect the result")
       ->check(CLI::Range(1, 256))

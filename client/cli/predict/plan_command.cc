@@ -4,6 +4,7 @@
 #include "client/cli/predict/plan_command.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <numbers>
 #include <string>
@@ -11,8 +12,11 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
+#include "client/cli/plan_build/ending_signals.h"
 #include "client/cli/shared/option_checks.h"
+#include "core/base/atomic_folder.h"
 #include "core/base/parallel_for.h"
+#include "core/base/random_id.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/mesh_defect.h"
 #include "core/planning/model_names.h"
@@ -80,17 +84,28 @@ struct PlanCheckOptions {
   PlanReadOptions reading;
 };
 
+// Zips are unpacked in a folder that is never published, and so goes with this function.
+absl::StatusOr<PlanBuildAnswer> CallComparison(const PlanCheckOptions& options, int cancel) {
+  const std::filesystem::path folder = std::filesystem::temp_directory_path();
+  TF_ASSIGN_OR_RETURN(const AtomicFolder work,
+                      AtomicFolder::Create((folder / ("tissueform-" + RandomId())).string()));
+  return CallPlanBuild({.ct = options.ct,
+                        .recipe = options.recipe,
+                        .labels = options.labels,
+                        .only_compare_labels = true,
+                        .folder = work.path(),
+                        .folder_name = {},
+                        .threads = AvailableProcessors()},
+                       {.tell = nullptr, .cancel = cancel});
+}
+
 // The Dice coefficients of a label map and of our own segmentation.
 absl::Status CompareLabels(const PlanCheckOptions& options) {
-  TF_ASSIGN_OR_RETURN(const PlanBuildAnswer answer,
-                      CallPlanBuild({.ct = options.ct,
-                                     .recipe = options.recipe,
-                                     .labels = options.labels,
-                                     .only_compare_labels = true,
-                                     .folder = {},
-                                     .folder_name = {},
-                                     .threads = AvailableProcessors()}));
-  absl::PrintF("%s", answer.text);
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<EndingSignals> signals, EndingSignals::Catch());
+  const absl::StatusOr<PlanBuildAnswer> answer = CallComparison(options, signals->descriptor());
+  if (absl::IsCancelled(answer.status())) signals->EndByArrived();
+  TF_RETURN_IF_ERROR(answer.status());
+  absl::PrintF("%s", answer->text);
   return absl::OkStatus();
 }
 
@@ -110,13 +125,15 @@ CLI::App* AddPlanCommand(CLI::App& app, CommandWork* work) {
       "Examples:\n"
       "  tissueform plan build --ct series/ --recipe recipe.json --out head\n"
       "  tissueform plan check head/plan.json\n"
-      "  tissueform plan fit head/plan.json --targets chin.json --out head/fitted.json");
+      "  tissueform plan fit head/plan.json --targets chin.json --out head/fitted.json\n"
+      "  tissueform plan export --slicer scene head/plan.json");
 
   auto options = std::make_shared<PlanCheckOptions>();
   CLI::App* check = plan->add_subcommand("check", "check a plan and its mesh, and summarize it");
   CLI::Option* file =
       check->add_option("PLAN", options->plan, "the plan file (docs/plan-format.md)");
-  CLI::Option* ct = check->add_option("--ct", options->ct, "with --labels: their CT");
+  CLI::Option* ct =
+      check->add_option("--ct", options->ct, "with --labels: their CT, or a zip of it");
   CLI::Option* labels = check->add_option(
       "--labels", options->labels,
       "instead of a plan: compare a label map with the segmentation of its CT (Dice coefficients)");

@@ -236,7 +236,7 @@ absl::Status Export(const PredictionOptions& options) {
   const PredictionMesh* named = mesh.has_value() ? &*mesh : nullptr;
   if (!options.pictures.empty()) {
     TF_ASSIGN_OR_RETURN(const CaseFile contents, ShownCase(named, prediction, client.get()));
-    TF_RETURN_IF_ERROR(ExportPictures(options.pictures, prediction, contents, positions));
+    TF_RETURN_IF_ERROR(WritePicturesOf(options.pictures, prediction, contents, positions));
     absl::PrintF("%s: %s in %s\n", prediction.name(), absl::StrJoin(BeforeAndAfterPictures(), ", "),
                  options.pictures);
   }

@@ -240,8 +240,8 @@ absl::Status ExportPrediction(const std::string& path, const v1::Prediction& pre
     const std::optional<MaterialBand> band =
         FindMaterialBandOrWarn(mesh->problem, positions, /*preparation=*/nullptr);
     if (band) json["material_uncertainty"] = MaterialBandToJson(*band);
-    TF_RETURN_IF_ERROR(
-        WriteResult(path, mesh->plan, mesh->problem, positions, band ? &*band : nullptr));
+    TF_RETURN_IF_ERROR(WriteResult(path, mesh->plan, mesh->problem, positions,
+                                   {.material = band ? &*band : nullptr}));
   } else if (ending == ".stl" || ending == ".ply") {
     TF_RETURN_IF_ERROR(WriteSkin(path, mesh->problem, positions));
   } else {
@@ -267,8 +267,8 @@ absl::StatusOr<CaseFile> ShownCase(const PredictionMesh* mesh, const v1::Predict
                    "; name the plan that made it (--plan)"));
 }
 
-absl::Status ExportPictures(const std::string& folder, const v1::Prediction& prediction,
-                            const CaseFile& contents, const Positions& positions) {
+absl::Status WritePicturesOf(const std::string& folder, const v1::Prediction& prediction,
+                             const CaseFile& contents, const Positions& positions) {
   std::map<std::string, HandlePose> poses;
   for (const v1::HandlePose& pose : prediction.poses()) {
     poses[pose.handle()] = ToNamedPose(pose).pose;

@@ -59,7 +59,7 @@ absl::StatusOr<CaseFile> ShownCase(const PredictionMesh* mesh, const v1::Predict
                                    TissueformClient* client);
 
 // Before and after, in `folder` (WriteBeforeAndAfter). `contents` is of the mesh of the prediction.
-absl::Status ExportPictures(const std::string& folder, const v1::Prediction& prediction,
-                            const CaseFile& contents, const Positions& positions);
+absl::Status WritePicturesOf(const std::string& folder, const v1::Prediction& prediction,
+                             const CaseFile& contents, const Positions& positions);
 
 }  // namespace tissueform

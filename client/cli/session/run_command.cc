@@ -71,8 +71,8 @@ absl::Status Run(const RunOptions& options) {
   stats.read_seconds = read_seconds;
   TF_ASSIGN_OR_RETURN(const Positions deformed, PredictOnServer(options, problem, &stats));
   stats.band = FindMaterialBandOrWarn(problem, deformed, /*preparation=*/nullptr);
-  TF_RETURN_IF_ERROR(
-      WriteResult(options.out, plan, problem, deformed, stats.band ? &*stats.band : nullptr));
+  TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed,
+                                 {.material = stats.band ? &*stats.band : nullptr}));
   if (!options.stats.empty()) {
     stats.elastic = SummarizeElastic(problem, deformed);
     TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));

@@ -34,6 +34,9 @@ inline constexpr CompanionCommand kDragCommand = {
     "tissueform-online"};
 inline constexpr CompanionCommand kSessionCommand = {
     "session", "list, show, update, link and delete the sessions of a server", "tissueform-online"};
+// Of `plan`.
+inline constexpr CompanionCommand kServerBuildCommand = {"build", "build a plan on a server",
+                                                         "tissueform-online"};
 // Of `mesh`.
 inline constexpr CompanionCommand kMeshUploadCommand = {
     "upload", "upload a mesh to a server and print its name", "tissueform-online"};
@@ -52,6 +55,8 @@ inline constexpr CompanionCommand kCaseCommand = {"case", "cases: what the brows
 inline constexpr CompanionCommand kExportCommand = {
     "export", "create a moving file: one web page that works without a server",
     "tissueform-online"};
+inline constexpr CompanionCommand kOutcomeCommand = {
+    "outcome", "compare predictions with the face after the operation", "tissueform-outcome"};
 inline constexpr CompanionCommand kShareCommand = {"share", "share your resources on a server",
                                                    "tissueform-online"};
 inline constexpr CompanionCommand kWhoamiCommand = {"whoami", "show your identity on a server",

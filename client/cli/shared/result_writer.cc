@@ -17,6 +17,7 @@
 #include "core/mechanics/elasticity/tet_strain.h"
 #include "core/mesh/io/tet_mesh_io.h"
 #include "core/mesh/operators/piecewise_linear_elements.h"
+#include "core/planning/planned_contact.h"
 
 namespace tissueform {
 namespace {
@@ -43,10 +44,18 @@ Attribute SealArray(const LipEdge& edge, const SealAnswer& seal, Eigen::Index nu
   return {kLipSealArray, 1, std::move(of_vertex)};
 }
 
+// Where the plan's mesh tells of contact, its result tells that it has none.
+void MarkContactAsLeftOut(std::vector<Attribute>* point_data, Eigen::Index num_vertices) {
+  for (Attribute& array : *point_data) {
+    if (array.name != kContactArray) continue;
+    array = {kContactArray, 1, std::vector<uint8_t>(static_cast<size_t>(num_vertices), 0)};
+  }
+}
+
 }  // namespace
 
 absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanProblem& problem,
-                         const Positions& deformed, const MaterialBand* band,
+                         const Positions& deformed, const ResultBands& bands,
                          const std::optional<SealAnswer>& seal) {
   std::error_code ignored;
   if (std::filesystem::equivalent(path, plan.mesh_path, ignored)) {
@@ -66,13 +75,18 @@ absl::Status WriteResult(const std::string& path, const Plan& plan, const PlanPr
   TetMeshFile file{std::move(mesh),
                    WithoutOld(problem.point_data,
                               {kDisplacementArray, kReactionForceArray, kMaterialUncertaintyArray,
-                               kMaterialUncertaintyNormalArray, kLipSealArray}),
+                               kMaterialUncertaintyNormalArray, kTotalUncertaintyArray,
+                               kSurgeryUncertaintyArray, kLipSealArray}),
                    WithoutOld(problem.cell_data,
                               {kPrincipalStrainArray, kVonMisesStressArray, kEnergyDensityArray})};
   file.point_data.push_back(RowsArray(kDisplacementArray, displacement));
   file.cell_data.push_back(RowsArray(kPrincipalStrainArray, strains));
   AddElasticArrays(problem, deformed, &file);
-  if (band != nullptr) AddMaterialBand(*band, &file);
+  if (bands.material != nullptr) AddMaterialBand(*bands.material, &file);
+  if (bands.total != nullptr) AddTotalBand(*bands.total, &file);
+  if (problem.contact_use == ContactUse::kLeftOut) {
+    MarkContactAsLeftOut(&file.point_data, deformed.rows());
+  }
   if (seal) file.point_data.push_back(SealArray(*problem.lip_edge, *seal, deformed.rows()));
   return WriteTetMesh(path, file);
 }

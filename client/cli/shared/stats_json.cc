@@ -152,6 +152,7 @@ OrderedJson StatsToJson(const PredictionStats& stats) {
   if (stats.contact_use != ContactUse::kNone) json["contact"] = ContactToJson(stats);
   if (stats.elastic) json["elastic"] = ElasticToJson(*stats.elastic);
   if (stats.band) json["material_uncertainty"] = MaterialBandToJson(*stats.band);
+  if (stats.total_band) json["uncertainty"] = TotalBandToJson(*stats.total_band);
   json["notice"] = kNotMedicalDeviceNotice;
   return json;
 }
@@ -177,6 +178,7 @@ void PrintOutcome(const std::string& out, const PredictionStats& stats) {
   } else if (stats.has_ranges && stats.contact_use != ContactUse::kOn) {
     absl::PrintF("material uncertainty: only for linear_elastic and neo_hookean\n");
   }
+  if (stats.total_band) absl::PrintF("%s", TotalBandText(*stats.total_band));
   if (quality.inverted_tets > 0) {
     absl::FPrintF(
         stderr,

@@ -10,6 +10,7 @@
 #include "nlohmann/json.hpp"
 
 #include "client/cli/shared/elastic_results.h"
+#include "client/cli/shared/total_band.h"
 #include "client/cli/shared/uncertainty_results.h"
 #include "core/mechanics/deformation/deformation_quality.h"
 #include "core/mechanics/deformation/deformer.h"
@@ -40,6 +41,7 @@ struct PredictionStats {
   std::optional<ElasticSummary> elastic;  // of the elastic models
   bool has_ranges = false;                // the plan gives ranges of the material
   std::optional<MaterialBand> band;       // where it does, of the elastic models
+  std::optional<TotalBand> total_band;    // of the elastic models, where the mesh names places
 };
 
 // The counts, model and mode of a problem; the rest is left for the caller to fill.

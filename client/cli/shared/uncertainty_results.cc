@@ -12,6 +12,7 @@
 #include "client/cli/shared/stage_progress.h"
 #include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
+#include "core/mechanics/uncertainty/held_contact.h"
 #include "core/mesh/tet_topology.h"
 #include "core/planning/skin_places.h"
 
@@ -20,16 +21,21 @@ namespace {
 
 bool IsElastic(const PlanProblem& problem) { return TraitsOf(problem.deformer.model).is_elastic; }
 
-absl::StatusOr<MaterialExpansion> Expand(const PlanProblem& problem, const Positions& deformed,
-                                         MeshPreparation* preparation) {
-  if (problem.deformer.model == DeformationModel::kNeoHookean) {
-    return ExpandNeoHookean(preparation, *problem.uncertainty, deformed, ExpansionOrder::kSecond);
+absl::StatusOr<AnswerExpansion> Expand(const PlanProblem& problem, const Positions& deformed,
+                                       MeshPreparation* preparation) {
+  const bool is_nonlinear = problem.deformer.model == DeformationModel::kNeoHookean;
+  const SparseMatrix held = HeldDirections(problem.constraints, problem.mesh->positions(),
+                                           problem.poses, deformed, is_nonlinear);
+  const SparseMatrix* with_contact = problem.constraints.contact().empty() ? nullptr : &held;
+  if (is_nonlinear) {
+    return ExpandNeoHookean(preparation, *problem.uncertainty, deformed, ExpansionOrder::kSecond,
+                            {}, with_contact);
   }
   const Positions displacements = deformed - problem.mesh->positions();
   return ExpandLinearElastic(
       preparation, *problem.uncertainty,
       Eigen::Map<const Eigen::VectorXd>(displacements.data(), displacements.size()),
-      ExpansionOrder::kSecond);
+      ExpansionOrder::kSecond, {}, with_contact);
 }
 
 std::vector<int32_t> WithoutConstrained(std::vector<int32_t> vertices,
@@ -61,7 +67,7 @@ MaterialBand::Place Summarize(const SkinPlace& place, const Eigen::VectorXd& ban
 }
 
 // The 95th percentile of one normal variable's distance, averaged.
-double MeanOf(const MaterialExpansion::Term& term, const std::vector<int32_t>& vertices) {
+double MeanOf(const AnswerExpansion::Term& term, const std::vector<int32_t>& vertices) {
   double sum = 0;
   for (const int32_t vertex : vertices) {
     sum += kNormal95 * term.field.col(0).segment<3>(3 * vertex).norm();
@@ -69,12 +75,12 @@ double MeanOf(const MaterialExpansion::Term& term, const std::vector<int32_t>& v
   return sum / static_cast<double>(vertices.size());
 }
 
-std::vector<MaterialBand::Cause> CausesOf(const MaterialExpansion& expansion,
+std::vector<MaterialBand::Cause> CausesOf(const AnswerExpansion& expansion,
                                           const MaterialUncertainty& uncertainty,
                                           const std::vector<int32_t>& vertices) {
   std::vector<MaterialBand::Cause> causes;
   for (const auto& term : expansion.terms) {
-    if (term.second != MaterialExpansion::kNone) continue;
+    if (term.second != AnswerExpansion::kNone) continue;
     const auto variable = static_cast<size_t>(term.first);
     causes.push_back({variable < uncertainty.tissues.size() ? uncertainty.tissues[variable].name
                                                             : "Poisson's ratio",
@@ -93,27 +99,28 @@ absl::StatusOr<std::optional<MaterialBand>> FindMaterialBand(
     const PlanProblem& problem, const Positions& deformed,
     std::shared_ptr<MeshPreparation> preparation) {
   if (!problem.uncertainty || !IsElastic(problem)) return std::nullopt;
-  if (!problem.constraints.contact().empty()) {
-    return absl::UnimplementedError("it is not known with contact; pass --contact off for it");
-  }
   TF_ASSIGN_OR_RETURN(const std::vector<SkinPlace> places, FreePlaces(problem));
   if (preparation == nullptr) {
     TF_ASSIGN_OR_RETURN(
         preparation, MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
                                              problem.deformer.preparation));
   }
-  TF_ASSIGN_OR_RETURN(const MaterialExpansion expansion,
-                      Expand(problem, deformed, preparation.get()));
   MaterialBand band;
-  band.band = SampleBand(expansion, SurfaceNormals(*problem.mesh, deformed),
+  TF_ASSIGN_OR_RETURN(band.expansion, Expand(problem, deformed, preparation.get()));
+  band.band = SampleBand(band.expansion, SurfaceNormals(*problem.mesh, deformed),
                          problem.deformer.preparation.threads);
   for (const SkinPlace& place : places) {
     band.places.push_back(Summarize(place, band.band.size_mm));
   }
   if (!places.empty()) {
-    band.causes = CausesOf(expansion, *problem.uncertainty, places.back().vertices);
+    band.causes = CausesOf(band.expansion, *problem.uncertainty, places.back().vertices);
   }
   return band;
+}
+
+void WarnOfMissingBand(const PlanProblem& problem, absl::string_view why) {
+  if (!problem.uncertainty || !IsElastic(problem)) return;
+  absl::FPrintF(stderr, "warning: material uncertainty is omitted: %s\n", why);
 }
 
 std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
@@ -124,7 +131,7 @@ std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
   absl::StatusOr<std::optional<MaterialBand>> band =
       FindMaterialBand(problem, deformed, std::move(preparation));
   if (band.ok()) return *std::move(band);
-  absl::FPrintF(stderr, "warning: material uncertainty is omitted: %s\n", band.status().message());
+  WarnOfMissingBand(problem, band.status().message());
   return std::nullopt;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
 #include "core/base/types.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
@@ -42,13 +43,15 @@ struct MaterialBand {
     std::string name;
     double mean_mm = 0;
   };
+  AnswerExpansion expansion;
   UncertaintyBand band;
   std::vector<Place> places;  // more than one where the mesh names places; "face" last
   std::vector<Cause> causes;
 };
 
 // Nothing where the plan gives no ranges or the model is not elastic. `deformed` is #V by 3, LPS.
-// `preparation` of the problem, or null: then one is made, which costs a factorisation.
+// `preparation` of the problem, or null: then one is made, which costs a factorisation. With
+// contact the rows that hold the answer stay as they are (HeldDirections).
 //
 // Errors: FailedPrecondition where `deformed` is no stable equilibrium; those of MeshPreparation.
 absl::StatusOr<std::optional<MaterialBand>> FindMaterialBand(
@@ -59,6 +62,9 @@ absl::StatusOr<std::optional<MaterialBand>> FindMaterialBand(
 std::optional<MaterialBand> FindMaterialBandOrWarn(const PlanProblem& problem,
                                                    const Positions& deformed,
                                                    std::shared_ptr<MeshPreparation> preparation);
+
+// Says on stderr `why` a plan that gives ranges gets no band.
+void WarnOfMissingBand(const PlanProblem& problem, absl::string_view why);
 
 // Adds both arrays.
 void AddMaterialBand(const MaterialBand& band, TetMeshFile* file);

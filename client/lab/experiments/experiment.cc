@@ -9,6 +9,7 @@
 #include "client/lab/experiments/guidance_experiment.h"
 #include "client/lab/experiments/lips_experiment.h"
 #include "client/lab/experiments/materials_experiment.h"
+#include "client/lab/experiments/ratios_experiment.h"
 #include "client/lab/experiments/solver_times_experiment.h"
 #include "client/lab/experiments/twist_experiment.h"
 #include "client/lab/experiments/uncertainty_experiment.h"
@@ -30,6 +31,8 @@ const std::vector<Experiment>& AllExperiments() {
        RunAccuracyExperiment, true},
       {"lips", "contact against CalculiX, two blocks and a head (only when named; needs ccx)",
        RunLipsExperiment, true},
+      {"ratios", "soft-to-hard ratios of heads beside published ranges (minutes; only when named)",
+       RunRatiosExperiment, true},
       {"uncertainty",
        "the band from stiffness on two heads against full sampling (minutes; only when named)",
        RunUncertaintyExperiment, true},

@@ -20,6 +20,8 @@ struct ExperimentOptions {
   std::function<absl::StatusOr<std::string>(const std::string& name)> find_plan;
   // Of the experiment "accuracy": AccuracyCaseNames and "locking"; all when empty.
   std::vector<std::string> cases;
+  // Of the experiment "ratios": plan files besides the bundled ones.
+  std::vector<std::string> plans;
   // Gets a line for every step of a long experiment. May be empty.
   std::function<void(const std::string&)> tell;
 

@@ -31,6 +31,7 @@ struct ExperimentsOptions {
   std::string out;
   std::vector<std::string> only;
   std::vector<std::string> cases;
+  std::vector<std::string> plans;
 };
 
 std::vector<std::string> ExperimentNames() {
@@ -78,6 +79,7 @@ ExperimentOptions OptionsFor(const ExperimentsOptions& options) {
   result.threads = AvailableProcessors();
   result.find_plan = FindBundledPlan;
   result.cases = options.cases;
+  result.plans = options.plans;
   result.tell = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
   return result;
 }
@@ -112,13 +114,18 @@ void AddExperimentsCommand(CLI::App& app, CommandWork* work) {
       ->add_option("--case", options->cases,
                    "only these cases of the experiment accuracy (default: all)")
       ->check(CLI::IsMember(CaseNames()));
-  command->footer(absl::StrCat(ExperimentList(),
-                               "Example:\n"
-                               "  tissueform experiments --out figures --only fig1\n"
-                               "  tissueform experiments accuracy --out accuracy\n"
-                               "  tissueform experiments accuracy --case head_chin --out accuracy\n"
-                               "docs/experiments.md compares them with the paper, "
-                               "docs/accuracy.md the models with finite elements."));
+  command->add_option("--plan", options->plans,
+                      "plan files that the experiment ratios measures besides the bundled heads, "
+                      "each with the viewer.glb of `tissueform plan build` beside its mesh");
+  command->footer(
+      absl::StrCat(ExperimentList(),
+                   "Example:\n"
+                   "  tissueform experiments --out figures --only fig1\n"
+                   "  tissueform experiments accuracy --out accuracy\n"
+                   "  tissueform experiments accuracy --case head_chin --out accuracy\n"
+                   "  tissueform experiments ratios --plan head/plan.json --out ratios\n"
+                   "docs/experiments.md compares them with the paper, "
+                   "docs/accuracy.md the models with finite elements."));
   command->callback([options, work] { *work = [options] { return RunExperiments(*options); }; });
 }
 

@@ -111,7 +111,7 @@ absl::StatusOr<Eigen::VectorXd> BandInFull(const Study& study, const Answer& mid
   return band;
 }
 
-absl::StatusOr<MaterialExpansion> Expand(const Study& study, const Answer& answer) {
+absl::StatusOr<AnswerExpansion> Expand(const Study& study, const Answer& answer) {
   if (study.model.model == DeformationModel::kNeoHookean) {
     return ExpandNeoHookean(answer.preparation.get(), study.ranges, answer.positions,
                             ExpansionOrder::kSecond);
@@ -122,10 +122,10 @@ absl::StatusOr<MaterialExpansion> Expand(const Study& study, const Answer& answe
                              ExpansionOrder::kSecond);
 }
 
-Eigen::VectorXd FirstOrder(const MaterialExpansion& expansion) {
+Eigen::VectorXd FirstOrder(const AnswerExpansion& expansion) {
   Eigen::MatrixXf fields(expansion.terms[0].field.rows(), expansion.variables);
   for (const auto& term : expansion.terms) {
-    if (term.second == MaterialExpansion::kNone) {
+    if (term.second == AnswerExpansion::kNone) {
       fields.col(term.first) = term.field.col(0).cast<float>();
     }
   }
@@ -175,7 +175,7 @@ absl::Status Run(const Study& study, const ExperimentOptions& options, CsvTable*
   options.Tell(absl::StrFormat("%s, %s, factor %g: %d answers in full", study.problem.name,
                                study.model.name, study.factor, kSamples));
   TF_ASSIGN_OR_RETURN(const Answer middle, Solve(study, study.problem.stiffness, {}));
-  TF_ASSIGN_OR_RETURN(const MaterialExpansion expansion, Expand(study, middle));
+  TF_ASSIGN_OR_RETURN(const AnswerExpansion expansion, Expand(study, middle));
   const Eigen::VectorXd band =
       SampleBand(expansion, SurfaceNormals(study.problem.mesh, middle.positions), study.threads)
           .size_mm;

@@ -45,6 +45,8 @@ KindCodes CodesOf(AuditEvent::Kind kind) {
       return {{"110102", kDcm, "Begin Transferring DICOM Instances"}, {}, 'E'};
     case AuditEvent::Kind::kTransferred:
       return {{"110104", kDcm, "DICOM Instances Transferred"}, {}, 'C'};
+    case AuditEvent::Kind::kLogin:
+      return {{"110114", kDcm, "User Authentication"}, {"110122", kDcm, "Login"}, 'E'};
     case AuditEvent::Kind::kNodeRefused:
       break;
   }

@@ -41,7 +41,8 @@ struct AuditEvent {
     kQuery,
     kTransferBegin,
     kTransferred,
-    kNodeRefused,  // a security alert: the PACS refuses us, or TLS fails
+    kLogin,        // to the review page
+    kNodeRefused,  // a security alert: the PACS or we refuse the other side, or TLS fails
   };
 
   Kind kind = Kind::kApplicationStart;

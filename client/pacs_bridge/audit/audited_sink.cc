@@ -78,4 +78,9 @@ AuditEvent AuditedSink::EventOf(AuditEvent::Kind kind, const AuditedStudy& study
           .study = study};
 }
 
+void AuditedSink::ConnectionRefused(const RefusedConnection& refused) {
+  access_->ConnectionRefused(refused);
+  sink_->ConnectionRefused(refused);
+}
+
 }  // namespace tissueform

@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 
+#include "client/pacs_bridge/audit/access_audit.h"
 #include "client/pacs_bridge/audit/bridge_audit.h"
 #include "client/pacs_bridge/network/instance_sink.h"
 #include "core/base/mutex.h"
@@ -18,15 +19,18 @@ namespace tissueform {
 
 // Audits what is received, and passes it on: for each study in an association an event when it
 // begins, and when it ends one for the objects that were kept and one for those that were not.
+// Refused connections go to `access`.
 // Thread-safe.
 class AuditedSink final : public InstanceSink {
  public:
-  // Both must outlive it.
-  AuditedSink(BridgeAudit* audit, InstanceSink* sink) : audit_(audit), sink_(sink) {}
+  // All must outlive it.
+  AuditedSink(BridgeAudit* audit, AccessAudit* access, InstanceSink* sink)
+      : audit_(audit), access_(access), sink_(sink) {}
 
   // Errors: also ResourceExhausted: the audit takes no events.
   absl::Status Keep(const ReceivedInstance& instance) override;
   void AssociationEnded(const EndedAssociation& ended) override;
+  void ConnectionRefused(const RefusedConnection& refused) override;
 
  private:
   struct Transfer {
@@ -40,6 +44,7 @@ class AuditedSink final : public InstanceSink {
                      const std::string& address) const;
 
   BridgeAudit* const audit_;
+  AccessAudit* const access_;
   InstanceSink* const sink_;
 
   Mutex mutex_;

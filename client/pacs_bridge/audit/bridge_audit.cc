@@ -27,11 +27,15 @@ BridgeAudit::BridgeAudit(std::unique_ptr<AuditSink> sink, std::string own_ae_tit
 
 BridgeAudit::~BridgeAudit() { Write(OfApplication(AuditEvent::Kind::kApplicationStop)); }
 
-void BridgeAudit::Write(AuditEvent event) {
+std::string BridgeAudit::MessageOf(AuditEvent event) const {
   event.time = absl::Now();
   event.source = ae_title_;
-  log_->Write(ToAuditMessage(event));
+  return ToAuditMessage(event);
 }
+
+void BridgeAudit::Write(AuditEvent event) { log_->Write(MessageOf(std::move(event))); }
+
+void BridgeAudit::WriteIfRoom(AuditEvent event) { log_->WriteIfRoom(MessageOf(std::move(event))); }
 
 AuditParticipant BridgeAudit::Self(AuditParticipant::Role role, bool is_requestor) const {
   return {.role = role,

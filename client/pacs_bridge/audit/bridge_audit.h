@@ -29,6 +29,8 @@ class BridgeAudit {
   void Release(int events) { log_->Release(events); }
   // An event in a place that was reserved; time and source are filled in.
   void Write(AuditEvent event);
+  // An event without a place: it is lost where there is no room.
+  void WriteIfRoom(AuditEvent event);
 
   // The bridge as a participant.
   AuditParticipant Self(AuditParticipant::Role role, bool is_requestor) const;
@@ -39,6 +41,7 @@ class BridgeAudit {
  private:
   BridgeAudit(std::unique_ptr<AuditSink> sink, std::string own_ae_title);
 
+  std::string MessageOf(AuditEvent event) const;
   AuditEvent OfApplication(AuditEvent::Kind kind) const;
 
   const std::string ae_title_;

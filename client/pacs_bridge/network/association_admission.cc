@@ -37,30 +37,30 @@ const char* ChooseSyntax(const T_ASC_PresentationContext& context) {
 
 }  // namespace
 
-bool AdmitAssociation(const ReceiverOptions& options, T_ASC_Association* association,
-                      bool crowded) {
+absl::Status AdmitAssociation(const ReceiverOptions& options, T_ASC_Association* association,
+                              bool crowded) {
   const auto& parameters = association->params->DULparams;
-  const auto deny = [&](T_ASC_RejectParametersReason reason) {
+  const auto deny = [&](T_ASC_RejectParametersReason reason, const char* text) {
     Refuse(association, ASC_RESULT_REJECTEDPERMANENT, ASC_SOURCE_SERVICEUSER, reason);
-    return false;
+    return absl::PermissionDeniedError(text);
   };
   if (crowded) {
     Refuse(association, ASC_RESULT_REJECTEDTRANSIENT,
            ASC_SOURCE_SERVICEPROVIDER_PRESENTATION_RELATED, ASC_REASON_SP_PRES_LOCALLIMITEXCEEDED);
-    return false;
+    return absl::UnavailableError("too many associations are open");
   }
   if (WithoutPadding(parameters.applicationContextName) != UID_StandardApplicationContext) {
-    return deny(ASC_REASON_SU_APPCONTEXTNAMENOTSUPPORTED);
+    return deny(ASC_REASON_SU_APPCONTEXTNAMENOTSUPPORTED, "unknown application context");
   }
   if (WithoutPadding(parameters.calledAPTitle) != options.ae_title) {
-    return deny(ASC_REASON_SU_CALLEDAETITLENOTRECOGNIZED);
+    return deny(ASC_REASON_SU_CALLEDAETITLENOTRECOGNIZED, "wrong called AE title");
   }
   const auto& titles = options.calling_ae_titles;
   if (std::find(titles.begin(), titles.end(), WithoutPadding(parameters.callingAPTitle)) ==
       titles.end()) {
-    return deny(ASC_REASON_SU_CALLINGAETITLENOTRECOGNIZED);
+    return deny(ASC_REASON_SU_CALLINGAETITLENOTRECOGNIZED, "unknown calling AE title");
   }
-  return true;
+  return absl::OkStatus();
 }
 
 bool NegotiateAssociation(T_ASC_Association* association) {

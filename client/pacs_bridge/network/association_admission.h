@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "absl/status/status.h"
+
 #include "client/pacs_bridge/network/storage_receiver.h"
 
 struct T_ASC_Association;
@@ -13,7 +15,11 @@ struct T_ASC_Association;
 namespace tissueform {
 
 // By the AE titles of both sides. `crowded`: there is no room now, whoever it is.
-bool AdmitAssociation(const ReceiverOptions& options, T_ASC_Association* association, bool crowded);
+//
+// Errors, and the association is refused: Unavailable (crowded), PermissionDenied. The message
+// contains no text of the other side.
+absl::Status AdmitAssociation(const ReceiverOptions& options, T_ASC_Association* association,
+                              bool crowded);
 
 // Takes storage classes and verification, each in the transfer syntax that the sender likes best.
 // False, and refused: nothing that was offered is taken.

@@ -40,6 +40,13 @@ struct EndedAssociation {
   std::string problem = {};  // one line without patient data; empty: none
 };
 
+// A connection, or a request for an association, that was refused.
+struct RefusedConnection {
+  std::string address = {};     // from where, without the port
+  std::string calling_ae = {};  // as the other side states it; empty: it has stated none
+  std::string reason = {};      // one line without text from outside
+};
+
 // Whoever takes what is received. Threads: called from many at once. What is in one association
 // need not be of one patient, study or series.
 class InstanceSink {
@@ -54,6 +61,9 @@ class InstanceSink {
 
   // Once an association, also when nothing came in it; not for those that were refused.
   virtual void AssociationEnded(const EndedAssociation& ended) = 0;
+
+  // Called for each refusal, however many come; must not block.
+  virtual void ConnectionRefused(const RefusedConnection& /*refused*/) {}
 };
 
 }  // namespace tissueform

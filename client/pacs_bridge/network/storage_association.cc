@@ -115,12 +115,18 @@ void ServeAssociation(const AssociationContext& context, int socket, const std::
   const OFCondition received =
       ReceiveAssociationFrom(socket, context.secure, context.options->connect_time, &served.layer,
                              &served.network, &served.association);
-  if (received.bad() || !AdmitAssociation(*context.options, served.association, crowded)) {
-    ++*context.refused;
-    return;
+  absl::Status admitted =
+      received.bad() ? absl::InvalidArgumentError("no valid association request, or TLS failed")
+                     : AdmitAssociation(*context.options, served.association, crowded);
+  if (admitted.ok() && !NegotiateAssociation(served.association)) {
+    admitted = absl::InvalidArgumentError("no presentation context that is accepted");
   }
-  if (!NegotiateAssociation(served.association)) {
+  if (!admitted.ok()) {
     ++*context.refused;
+    context.sink->ConnectionRefused(
+        {.address = address,
+         .calling_ae = received.bad() ? "" : CallingTitleOf(*served.association),
+         .reason = std::string(admitted.message())});
     return;
   }
   if (ASC_acknowledgeAssociation(served.association).bad()) return;

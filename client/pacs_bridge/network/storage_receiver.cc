@@ -88,9 +88,13 @@ class Receiver : public StorageReceiver {
 
   void Admit(const ListeningSocket::Connection& taken) {
     const int64_t open = open_;
-    if (!addresses_.Contains(taken.address) || open >= options_.max_associations + kTold) {
+    const bool is_known = addresses_.Contains(taken.address);
+    if (!is_known || open >= options_.max_associations + kTold) {
       ++refused_;
       close(taken.socket);
+      context_.sink->ConnectionRefused(
+          {.address = taken.address,
+           .reason = is_known ? "too many associations are open" : "unknown address"});
       return;
     }
     MutexLock lock(mutex_);

@@ -111,7 +111,7 @@ void AddPlaces(const PredictionObjectsInput& input, const PredictedCase& predict
     tree->AddNumber(movement, place.p95_mm, "mm", OwnTerm("P95", "95th percentile"));
     tree->AddNumber(movement, place.largest_mm, "mm", Largest());
     if (place.largest_band_mm) {
-      tree->AddNumber(OwnTerm("BAND", "Band of uncertainty, 95 of 100 cases"),
+      tree->AddNumber(OwnTerm("BAND", "Band of uncertainty of the material, 95 of 100 cases"),
                       *place.largest_band_mm, "mm", Largest());
     }
     tree->Close();
@@ -133,6 +133,19 @@ void AddLandmarks(const PredictionObjectsInput& input, const PredictedCase& pred
   tree->Close();
 }
 
+// The interval of the material alone is far narrower: both names say what is in doubt.
+CodedTerm LowestAfter(bool is_whole) {
+  return is_whole
+             ? OwnTerm("WHOLE_LOWEST", "After, lowest in 95 of 100 cases: surgery, model, material")
+             : OwnTerm("AFTER_LOWEST", "After, lowest in 95 of 100 cases, of the material");
+}
+
+CodedTerm HighestAfter(bool is_whole) {
+  return is_whole ? OwnTerm("WHOLE_HIGHEST",
+                            "After, highest in 95 of 100 cases: surgery, model, material")
+                  : OwnTerm("AFTER_HIGHEST", "After, highest in 95 of 100 cases, of the material");
+}
+
 void AddMeasure(const v1::Measure& measure, ReportTree* tree) {
   tree->Open(OwnTerm("MEASURE", "Measure"));
   AddPlain(NameTerm(), measure.name(), tree);
@@ -142,10 +155,9 @@ void AddMeasure(const v1::Measure& measure, ReportTree* tree) {
   tree->AddNumber(OwnTerm("DIFFERENCE", "Difference, after minus before"),
                   measure.after() - measure.before(), measure.unit());
   if (measure.has_lowest_after() && measure.has_highest_after()) {
-    tree->AddNumber(OwnTerm("AFTER_LOWEST", "After, lowest in 95 of 100 cases"),
-                    measure.lowest_after(), measure.unit());
-    tree->AddNumber(OwnTerm("AFTER_HIGHEST", "After, highest in 95 of 100 cases"),
-                    measure.highest_after(), measure.unit());
+    const bool is_whole = measure.interval_is_whole();
+    tree->AddNumber(LowestAfter(is_whole), measure.lowest_after(), measure.unit());
+    tree->AddNumber(HighestAfter(is_whole), measure.highest_after(), measure.unit());
   }
   tree->Close();
 }

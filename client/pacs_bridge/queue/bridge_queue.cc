@@ -44,10 +44,13 @@ constexpr char kQueueTables[] =
     "PRIMARY KEY (export, key)) STRICT;";
 
 // What came later than the first queues of this version, whose programs pass over it.
-// A case has the first images of its series, by how many there were when it was packed.
+// A case has the first images of its series, by how many there were when it was packed; a draft on
+// the server, too, when it was sent.
 constexpr char kLaterTables[] =
     "CREATE INDEX IF NOT EXISTS series_by_state ON series(state);"
     "CREATE TABLE IF NOT EXISTS cases (name TEXT PRIMARY KEY, series TEXT NOT NULL REFERENCES "
+    "series(key), images INTEGER NOT NULL) STRICT;"
+    "CREATE TABLE IF NOT EXISTS drafts (name TEXT PRIMARY KEY, series TEXT NOT NULL REFERENCES "
     "series(key), images INTEGER NOT NULL) STRICT;"
     "INSERT OR IGNORE INTO cases SELECT case_name, key, (SELECT COUNT(*) FROM images WHERE "
     "images.series = series.key) FROM series WHERE case_name <> '';";

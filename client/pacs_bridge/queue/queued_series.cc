@@ -14,9 +14,9 @@
 namespace tissueform {
 namespace {
 
-constexpr std::array<const char*, 9> kSeriesStates = {"receiving",   "incomplete", "complete",
-                                                      "passed_over", "chosen",     "built",
-                                                      "packed",      "published",  "failed"};
+constexpr std::array<const char*, 11> kSeriesStates = {
+    "receiving", "incomplete", "complete", "passed_over", "chosen", "built",
+    "packed",    "published",  "failed",   "drafting",    "draft"};
 
 absl::StatusOr<SeriesState> StateOf(absl::string_view name) {
   for (size_t i = 0; i < kSeriesStates.size(); ++i) {

@@ -32,6 +32,8 @@ enum class SeriesState {
   kPacked,  // the case lies in the plan folder, and its name is known
   kPublished,
   kFailed,
+  kDrafting,  // chosen, to wait on the server for its operator
+  kDraft,     // waits there (DraftRows); published when a case was built of it
 };
 const char* SeriesStateName(SeriesState state);
 

@@ -19,7 +19,7 @@ namespace {
 #define TF_SERIES_COLUMNS TF_SERIES_FIELDS TF_IMAGE_COUNT " FROM series "
 
 // States of a series of which nothing was made yet: more images may change what is.
-#define TF_NOT_BUILT "('incomplete', 'complete', 'passed_over', 'chosen')"
+#define TF_NOT_BUILT "('incomplete', 'complete', 'passed_over', 'chosen', 'drafting')"
 
 absl::Status InsertStudy(Database& database, const QueuedStudy& study) {
   return database.Prepare("INSERT OR IGNORE INTO studies VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
@@ -180,8 +180,8 @@ absl::Status ReceivedRows::UpdateStep(const QueuedSeries& series, SeriesState be
     TF_RETURN_IF_ERROR(
         database
             .Prepare("UPDATE series SET state = ?, case_name = ?, attempts = ?, last_error = ?, "
-                     "done_s = ? WHERE key = ? AND state = ? AND (state <> 'chosen' "
-                     "OR " TF_IMAGE_COUNT " = ?)")
+                     "done_s = ? WHERE key = ? AND state = ? AND (state NOT IN ('chosen', "
+                     "'drafting') OR " TF_IMAGE_COUNT " = ?)")
             .Bind(SeriesStateName(series.state))
             .Bind(series.case_name)
             .Bind(series.attempts)
@@ -305,6 +305,7 @@ absl::Status ReceivedRows::Forget(const std::string& series) {
   return queue_->Change([&](Database& database) -> absl::Status {
     TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM images WHERE series = ?").Bind(series).Run());
     TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM cases WHERE series = ?").Bind(series).Run());
+    TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM drafts WHERE series = ?").Bind(series).Run());
     TF_RETURN_IF_ERROR(database.Prepare("DELETE FROM series WHERE key = ?").Bind(series).Run());
     return database.Execute("DELETE FROM studies WHERE uid NOT IN (SELECT study_uid FROM series)");
   });

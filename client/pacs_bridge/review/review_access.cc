@@ -19,6 +19,14 @@ namespace {
 constexpr size_t kLeastPasswordCharacters = 16;
 constexpr size_t kMaxPasswordBytes = 4096;
 
+// NAME:PASSWORD of HTTP Basic; empty where it is not that.
+std::string DecodedBasic(absl::string_view authorization) {
+  std::string decoded;
+  const bool is_basic = absl::ConsumePrefix(&authorization, "Basic ") &&
+                        absl::Base64Unescape(authorization, &decoded);
+  return is_basic ? decoded : std::string();
+}
+
 }  // namespace
 
 bool IsSameSecret(const std::string& given, const std::string& secret) {
@@ -61,12 +69,13 @@ std::string HostWithoutPort(const std::string& host) {
   return host.substr(0, host.find(':'));
 }
 
+std::string BasicName(const std::string& authorization) {
+  const std::string decoded = DecodedBasic(authorization);
+  return decoded.substr(0, decoded.find(':'));
+}
+
 bool IsBasicPassword(const std::string& authorization, const std::string& password) {
-  absl::string_view encoded = authorization;
-  std::string decoded;
-  if (!absl::ConsumePrefix(&encoded, "Basic ") || !absl::Base64Unescape(encoded, &decoded)) {
-    return false;
-  }
+  const std::string decoded = DecodedBasic(authorization);
   const size_t colon = decoded.find(':');
   return colon != std::string::npos && IsSameSecret(decoded.substr(colon + 1), password);
 }

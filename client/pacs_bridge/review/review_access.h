@@ -17,6 +17,9 @@ bool IsSameSecret(const std::string& given, const std::string& secret);
 // Whether a header `Authorization` is HTTP Basic with this password and any name.
 bool IsBasicPassword(const std::string& authorization, const std::string& password);
 
+// The name in a header `Authorization` of HTTP Basic; empty if the header does not have one.
+std::string BasicName(const std::string& authorization);
+
 // The first line's worth of a password file, without blanks around it.
 //
 // Errors: InvalidArgument: it cannot be read, others may read it, or it is too short.

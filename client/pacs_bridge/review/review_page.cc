@@ -37,6 +37,10 @@ const char* WordsOf(SeriesState state) {
       return "ready to plan";
     case SeriesState::kFailed:
       return "failed";
+    case SeriesState::kDrafting:
+      return "is sent to the planner";
+    case SeriesState::kDraft:
+      return "waits in the planner for a plan";
   }
   return "";
 }
@@ -63,6 +67,13 @@ std::string PlannerLink(const std::string& planner_url, const std::string& case_
   return absl::StrCat("<a href=\"", EscapedHtml(planner_url),
                       "#case=", EscapedHtml(absl::StripPrefix(case_name, "cases/")),
                       "\">Open in the planner</a>");
+}
+
+std::string DraftLink(const std::string& planner_url, const std::string& draft) {
+  if (planner_url.empty() || draft.empty()) return {};
+  return absl::StrCat("<a href=\"", EscapedHtml(planner_url),
+                      "#new&amp;draft=", EscapedHtml(absl::StripPrefix(draft, "buildDrafts/")),
+                      "\">Plan it</a>");
 }
 
 std::string PatientList(const QueuedStudy& study) {
@@ -132,7 +143,7 @@ std::string SeriesRow(const ReviewSeries& row, const ReviewPageOptions& options)
                       "</td><td>",
                       row.series.state == SeriesState::kPublished
                           ? PlannerLink(options.planner_url, row.series.case_name)
-                          : "",
+                          : DraftLink(options.planner_url, row.draft),
                       "</td></tr>");
 }
 

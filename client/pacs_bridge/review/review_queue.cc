@@ -8,6 +8,7 @@
 #include <map>
 #include <system_error>
 
+#include "client/pacs_bridge/queue/draft_rows.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {
@@ -32,26 +33,31 @@ absl::StatusOr<ReviewQueue> ReadReviewQueue(BridgeQueue* queue) {
   ReviewQueue list;
   TF_ASSIGN_OR_RETURN(std::vector<QueuedSeries> all, received.List());
   std::reverse(all.begin(), all.end());
-  std::map<std::string, ReviewSeries> by_case;
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedDraft> drafts, DraftRows(queue).List());
+  std::map<std::string, std::string> draft_of;
+  for (const QueuedDraft& draft : drafts) draft_of[draft.series] = draft.name;
   for (const QueuedSeries& series : all) {
     if (series.state == SeriesState::kPassedOver) {
       ++list.passed_over;
       continue;
     }
     TF_ASSIGN_OR_RETURN(const QueuedStudy study, received.GetStudy(series.study_uid));
-    const ReviewSeries row = {series, study};
-    if (!series.case_name.empty()) by_case[series.case_name] = row;
-    if (list.series.size() < kMaxReviewRows) list.series.push_back(row);
+    const bool waits = series.state == SeriesState::kDraft;
+    if (list.series.size() < kMaxReviewRows) {
+      list.series.push_back({series, study, waits ? draft_of[series.key] : ""});
+    }
   }
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedExport> asked, exports.List());
   for (const QueuedExport& queued : asked) {
     if (queued.state == BridgeExportState::kTold || list.exports.size() >= kMaxReviewRows) {
       continue;
     }
-    const auto found = by_case.find(queued.case_name);
-    if (found == by_case.end()) continue;
+    // Also of an earlier case of its series.
+    const absl::StatusOr<QueuedSeries> of = received.GetByCase(queued.case_name);
+    if (!of.ok()) continue;
+    TF_ASSIGN_OR_RETURN(const QueuedStudy study, received.GetStudy(of->study_uid));
     list.exports.push_back(
-        {queued, found->second, PicturesIn(queue->object_folder(queued.key) + "/pictures")});
+        {queued, {*of, study}, PicturesIn(queue->object_folder(queued.key) + "/pictures")});
   }
   std::stable_sort(
       list.exports.begin(), list.exports.end(),

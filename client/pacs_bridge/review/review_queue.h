@@ -18,6 +18,7 @@ namespace tissueform {
 struct ReviewSeries {
   QueuedSeries series = {};
   QueuedStudy study = {};
+  std::string draft = {};  // "buildDrafts/{id}" while it waits; else empty
 };
 
 // One export that waits for a person, or is under way.

@@ -129,8 +129,19 @@ class HttpReviewServer final : public ReviewServer {
       Refuse(response, 421, "unknown host; see --review-host");
       return false;
     }
-    if (password_.empty() || IsBasicPassword(request.get_header_value("Authorization"), password_))
-      return true;
+    if (password_.empty()) return true;
+    const std::string given = request.get_header_value("Authorization");
+    const bool is_accepted = IsBasicPassword(given, password_);
+    // Browsers ask once without a password before they ask the user: that is not a login.
+    if (!given.empty() && options_.on_login) {
+      const absl::Status heard = options_.on_login(
+          {.address = request.remote_addr, .user = BasicName(given), .is_accepted = is_accepted});
+      if (is_accepted && !heard.ok()) {
+        Refuse(response, 503, "the login cannot be recorded; see the log of the bridge");
+        return false;
+      }
+    }
+    if (is_accepted) return true;
     response->set_header("WWW-Authenticate", "Basic realm=\"Tissueform review page\"");
     Refuse(response, 401, "the review page requires its password");
     return false;

@@ -8,11 +8,19 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 #include "client/pacs_bridge/queue/bridge_queue.h"
 
 namespace tissueform {
+
+// A request that gives a password.
+struct ReviewLogin {
+  std::string address = {};  // of the connection: behind a proxy the proxy's
+  std::string user = {};     // as the client states it; may be empty
+  bool is_accepted = false;
+};
 
 struct ReviewOptions {
   std::string address = "127.0.0.1";
@@ -22,6 +30,9 @@ struct ReviewOptions {
   // A password of at least 16 characters, by HTTP Basic with any name; mode 0600. Empty: none.
   std::string token_file = {};
   std::string planner_url = {};
+  // Hears of each request that gives a password, on any thread. What it does not take of accepted
+  // ones is answered with 503. Null: without a listener.
+  std::function<absl::Status(const ReviewLogin&)> on_login = nullptr;
 };
 
 // The review page: a small web server for those who may see names. It shows what the queue holds,

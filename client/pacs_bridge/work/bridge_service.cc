@@ -18,6 +18,8 @@ namespace {
 constexpr std::chrono::milliseconds kIntakePause{250};
 constexpr std::chrono::milliseconds kStepPause{1000};
 constexpr std::chrono::hours kDeletionPause{1};
+// A person waits for the case of a draft in the planner, which asks nothing of the bridge.
+constexpr std::chrono::seconds kDraftsPause{5};
 // Whether exports that wait were taken back, which no watch tells.
 constexpr std::chrono::minutes kLookPause{5};
 // What a server may tell of before it is taken; each is told again by the next watch.
@@ -28,10 +30,11 @@ constexpr char kPlans[] = "plans";
 constexpr char kExports[] = "exports";
 constexpr char kPictures[] = "pictures";
 constexpr char kWatch[] = "watch";
+constexpr char kDrafts[] = "drafts";  // a key of what is tried again alone
 
 bool HasPlanStep(SeriesState state) {
   return state == SeriesState::kChosen || state == SeriesState::kBuilt ||
-         state == SeriesState::kPacked;
+         state == SeriesState::kPacked || state == SeriesState::kDrafting;
 }
 
 bool HasExportStep(const QueuedExport& queued) {
@@ -102,7 +105,28 @@ void BridgeService::TakeIn() {
   }
 }
 
+void BridgeService::FollowDrafts() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_drafts_ || !plan_retries_.Due(kDrafts)) return;
+  next_drafts_ = now + kDraftsPause;
+  threads_.BeginStep(kPlans);
+  const absl::StatusOr<std::vector<std::string>> changed = parts_.plans->FollowDrafts();
+  if (!changed.ok()) {
+    plan_retries_.Failed(kDrafts);
+    return Tell(changed.status(), "the server cannot be asked for its drafts");
+  }
+  plan_retries_.Succeeded(kDrafts);
+  ReceivedRows rows(parts_.queue);
+  for (const std::string& key : *changed) {
+    const absl::StatusOr<QueuedSeries> series = rows.Get(key);
+    if (!series.ok()) continue;
+    Tell(absl::OkStatus(),
+         absl::StrCat("series ", key, ": draft -> ", SeriesStateName(series->state)));
+  }
+}
+
 void BridgeService::WorkOnPlans() {
+  FollowDrafts();
   ReceivedRows rows(parts_.queue);
   const absl::StatusOr<std::vector<QueuedSeries>> all = rows.List();
   if (!all.ok()) return Tell(all.status(), "the queue cannot be read");

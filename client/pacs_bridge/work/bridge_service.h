@@ -64,6 +64,7 @@ class BridgeService {
   };
 
   void TakeIn();
+  void FollowDrafts();
   void WorkOnPlans();
   void TakeHeard() ABSL_LOCKS_EXCLUDED(mutex_);
   // False: it is to be taken later.
@@ -79,6 +80,7 @@ class BridgeService {
 
   // Each of one thread.
   RetryTimes plan_retries_;
+  std::chrono::steady_clock::time_point next_drafts_ = {};
   RetryTimes export_retries_;
   RetryTimes take_retries_;
   RetryTimes watch_retries_;

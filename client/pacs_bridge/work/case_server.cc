@@ -71,15 +71,16 @@ class WatchEnd {
 
 class ConnectedCaseServer final : public CaseServer {
  public:
-  ConnectedCaseServer(std::string address, ConnectionOptions options)
-      : address_(std::move(address)), options_(std::move(options)) {}
+  ConnectedCaseServer(std::string address, ConnectionOptions options, std::string project)
+      : address_(std::move(address)), options_(std::move(options)), project_(std::move(project)) {}
 
   absl::StatusOr<std::string> Publish(const std::string& case_bytes,
                                       const std::string& title) override {
     TF_ASSIGN_OR_RETURN(const CaseFile contents, ParseCase(case_bytes));
     TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
     TF_RETURN_IF_ERROR(client->UploadMesh(PayloadOfCase(contents.mesh)).status());
-    TF_ASSIGN_OR_RETURN(const v1::Case made, client->cases().Upload(case_bytes, title));
+    TF_ASSIGN_OR_RETURN(const v1::Case made,
+                        client->cases().Upload(case_bytes, title, {}, project_));
     return made.name();
   }
 
@@ -100,6 +101,29 @@ class ConnectedCaseServer final : public CaseServer {
                                                const v1::Prediction& prediction) override {
     TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
     return AskMaterialBand(client, contents, prediction);
+  }
+
+  absl::StatusOr<std::string> SendDraft(const std::string& ct, const std::string& title,
+                                        const std::string& recipe_json) override {
+    TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
+    TF_ASSIGN_OR_RETURN(const v1::BuildFile file, client->plan_builds().Upload(ct, ".mha"));
+    v1::CreateBuildDraftRequest request;
+    request.set_ct(file.name());
+    request.set_title(title);
+    request.set_project(project_);
+    request.set_recipe_json(recipe_json);
+    TF_ASSIGN_OR_RETURN(const v1::BuildDraft draft, client->plan_builds().CreateDraft(request));
+    return draft.name();
+  }
+
+  absl::StatusOr<std::vector<v1::BuildDraft>> ListDrafts() override {
+    TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
+    return client->plan_builds().ListDrafts();
+  }
+
+  absl::Status RemoveDraft(const std::string& name) override {
+    TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
+    return client->plan_builds().DeleteDraft(name);
   }
 
   absl::StatusOr<v1::Export> GetExport(const std::string& name) override {
@@ -144,6 +168,7 @@ class ConnectedCaseServer final : public CaseServer {
   // Constant.
   const std::string address_;
   const ConnectionOptions options_;
+  const std::string project_;
 
   Mutex mutex_;
   std::unique_ptr<TissueformClient> client_ ABSL_GUARDED_BY(mutex_);
@@ -152,11 +177,13 @@ class ConnectedCaseServer final : public CaseServer {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<CaseServer>> ConnectToCaseServer(const std::string& address,
-                                                                const ConnectionOptions& options) {
+                                                                const ConnectionOptions& options,
+                                                                const std::string& project) {
   // What is wrong with the options is said now; the server may come later.
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<TokenFile> token, OpenTokenOf(options));
   TF_RETURN_IF_ERROR(MakeServerChannel(address, options, token, grpc::ChannelArguments()).status());
-  return std::unique_ptr<CaseServer>(std::make_unique<ConnectedCaseServer>(address, options));
+  return std::unique_ptr<CaseServer>(
+      std::make_unique<ConnectedCaseServer>(address, options, project));
 }
 
 }  // namespace tissueform

@@ -16,6 +16,7 @@
 #include "core/base/types.h"
 #include "core/planning/case_file/case_file.h"
 #include "tissueform/v1/export_service.pb.h"
+#include "tissueform/v1/plan_build_service.pb.h"
 #include "tissueform/v1/prediction_service.pb.h"
 
 namespace tissueform {
@@ -43,6 +44,13 @@ class CaseServer {
   virtual absl::StatusOr<std::vector<double>> ReadBand(const CaseFile& contents,
                                                        const v1::Prediction& prediction) = 0;
 
+  // Leaves a CT (BuildInputFiles::kCt) with a recipe for a person, as often as one likes. Returns
+  // "buildDrafts/{id}".
+  virtual absl::StatusOr<std::string> SendDraft(const std::string& ct, const std::string& title,
+                                                const std::string& recipe_json) = 0;
+  virtual absl::StatusOr<std::vector<v1::BuildDraft>> ListDrafts() = 0;
+  virtual absl::Status RemoveDraft(const std::string& name) = 0;
+
   virtual absl::StatusOr<v1::Export> GetExport(const std::string& name) = 0;
   virtual absl::Status UpdateExport(const std::string& name, v1::ExportState state,
                                     const std::string& detail, int stored_objects) = 0;
@@ -52,9 +60,10 @@ class CaseServer {
                                     const Cancellation& cancelled) = 0;
 };
 
-// The one at `address` ("HOST:PORT"). Sends nothing yet. Errors: those of
-// TissueformClient::Connect.
+// The one at `address` ("HOST:PORT"). `project`: of cases and drafts there; may be empty. Sends
+// nothing yet. Errors: those of TissueformClient::Connect.
 absl::StatusOr<std::unique_ptr<CaseServer>> ConnectToCaseServer(const std::string& address,
-                                                                const ConnectionOptions& options);
+                                                                const ConnectionOptions& options,
+                                                                const std::string& project = "");
 
 }  // namespace tissueform

@@ -13,6 +13,7 @@
 
 #include "client/pacs_bridge/dicom/dicom_uid.h"
 #include "client/pacs_bridge/dicom/instance_header.h"
+#include "client/pacs_bridge/queue/draft_rows.h"
 #include "client/pacs_bridge/work/plan_work.h"
 #include "client/pacs_bridge/work/retry_times.h"
 #include "core/base/status_macros.h"
@@ -51,9 +52,26 @@ int CountSent(const std::vector<QueuedObject>& objects) {
 
 }  // namespace
 
+// A case of a draft may be so new that PlanWork::FollowDrafts has not noted it.
+absl::StatusOr<QueuedSeries> ExportWork::SeriesOfCase(const std::string& case_name) {
+  absl::StatusOr<QueuedSeries> known = received_.GetByCase(case_name);
+  if (!absl::IsNotFound(known.status())) return known;
+  DraftRows rows(queue_);
+  TF_ASSIGN_OR_RETURN(const std::vector<QueuedDraft> drafts, rows.List());
+  if (drafts.empty()) return known;
+  TF_ASSIGN_OR_RETURN(const std::vector<v1::BuildDraft> told, server_->ListDrafts());
+  for (const v1::BuildDraft& one : told) {
+    if (std::find(one.cases().begin(), one.cases().end(), case_name) == one.cases().end()) continue;
+    const auto draft = std::ranges::find(drafts, one.name(), &QueuedDraft::name);
+    if (draft == drafts.end()) continue;
+    TF_RETURN_IF_ERROR(rows.AddCase(*draft, case_name));
+  }
+  return received_.GetByCase(case_name);
+}
+
 absl::Status ExportWork::Take(const v1::Export& told) {
   if (IsDone(told.state())) return absl::OkStatus();
-  const absl::StatusOr<QueuedSeries> series = received_.GetByCase(told.case_());
+  const absl::StatusOr<QueuedSeries> series = SeriesOfCase(told.case_());
   if (absl::IsNotFound(series.status())) {
     if (options_.inform) {
       options_.inform(absl::StrCat(told.name(), " has a case of another bridge and is left to it"));

@@ -56,7 +56,8 @@ class ExportWork {
         pictures_(server, writer, options.warn) {}
 
   // Takes what the server tells of an export into the queue. A case that is none of this bridge is
-  // another bridge's: nothing happens but a line that says so. Errors: those of the queue.
+  // another bridge's: nothing happens but a line that says so. Errors: those of the queue and,
+  // while drafts wait, of the server.
   absl::Status Take(const v1::Export& told);
 
   // Draws the pictures for one that is asked for, for who is to confirm it, and asks for its band;
@@ -77,6 +78,8 @@ class ExportWork {
   absl::Status Step(QueuedExport* queued);
 
  private:
+  // Errors: NotFound: of none of this bridge; those of the server.
+  absl::StatusOr<QueuedSeries> SeriesOfCase(const std::string& case_name);
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
   // Back to the person: whoever confirmed has seen somebody else than the PACS names now.

@@ -6,14 +6,20 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
+#include "client/pacs_bridge/queue/draft_rows.h"
 #include "client/pacs_bridge/queue/received_rows.h"
 #include "client/pacs_bridge/work/case_server.h"
 
 namespace tissueform {
+
+struct PlanBuildAnswer;
+struct PlanBuildRequest;
 
 struct PlanWorkOptions {
   int threads = 0;         // of `plan build`; 0: all processors
@@ -35,6 +41,12 @@ struct PlanWorkOptions {
 //   packed     the case to the server
 //   published
 //
+// Or to a draft there, which a person makes a case of:
+//
+//   drafting   the CT without what names the patient, and the recipe, to the server
+//   draft      FollowDrafts: until the server tells of a case, or no more of the draft
+//   published
+//
 // Every step may be repeated: a folder appears at once, a case is named by its bytes before it is
 // sent. Neither the plan's folder nor the case names a patient: they see pixels and geometry only,
 // and folder and title are named by the series' random key.
@@ -44,7 +56,11 @@ struct PlanWorkOptions {
 class PlanWork {
  public:
   PlanWork(BridgeQueue* queue, CaseServer* server, PlanWorkOptions options)
-      : queue_(queue), rows_(queue), server_(server), options_(std::move(options)) {}
+      : queue_(queue),
+        rows_(queue),
+        drafts_(queue),
+        server_(server),
+        options_(std::move(options)) {}
 
   // The next step of `series`, which was read from the queue, and whose new state is written there
   // and into it. An error that is no transient one makes the series kFailed, with the reason; the
@@ -54,13 +70,26 @@ class PlanWork {
   // more images have come while the plan was built: it is thrown away, and `series` is read anew.
   absl::Status Step(QueuedSeries* series);
 
+  // Asks the server what was made of the drafts there: each case is noted as one of its series.
+  // Returns keys of series whose state has changed. Asks nothing where there are none.
+  absl::StatusOr<std::vector<std::string>> FollowDrafts();
+
  private:
+  // Calls tissueform-plan-build with the images and the recipe of the series.
+  absl::StatusOr<PlanBuildAnswer> CallOn(const QueuedSeries& series, PlanBuildRequest request);
   absl::Status Build(QueuedSeries* series);
+  absl::Status SendDraft(QueuedSeries* series);
+  // What was sent of the series before, and nothing was built of.
+  absl::Status RemoveDrafts(const std::string& series);
+  // True: its series has changed.
+  absl::StatusOr<bool> TakeCases(const QueuedDraft& draft, const v1::BuildDraft& told);
+  absl::StatusOr<bool> TakeLoss(const QueuedDraft& draft);
   absl::Status Pack(QueuedSeries* series);
   absl::Status Publish(QueuedSeries* series);
 
   BridgeQueue* const queue_;
   ReceivedRows rows_;
+  DraftRows drafts_;
   CaseServer* const server_;
   const PlanWorkOptions options_;
 };

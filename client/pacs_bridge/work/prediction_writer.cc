@@ -14,8 +14,8 @@
 
 #include "client/pacs_bridge/objects/prediction_objects.h"
 #include "client/pacs_bridge/work/material_band.h"
-#include "client/pacs_bridge/work/tissueform_command.h"
 #include "core/base/atomic_file.h"
+#include "core/base/process/tissueform_command.h"
 #include "core/base/status_macros.h"
 
 namespace tissueform {

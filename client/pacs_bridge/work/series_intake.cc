@@ -31,16 +31,19 @@ std::string ModalityOf(const std::string& text) {
   return is_modality ? text : "?";
 }
 
-constexpr char kCameLate[] = "images arrived after its plan was built; the plan lacks them";
+constexpr char kCameLate[] =
+    "images arrived after its plan was built, or its draft was sent; the plan lacks them";
 constexpr char kOfAnotherStudy[] =
     "images of the same series name another study; check their sender";
 
 bool IsBuilt(SeriesState state) {
   return state == SeriesState::kBuilt || state == SeriesState::kPacked ||
-         state == SeriesState::kPublished;
+         state == SeriesState::kPublished || state == SeriesState::kDraft;
 }
 
-bool HasPlan(SeriesState state) { return state == SeriesState::kChosen || IsBuilt(state); }
+bool HasPlan(SeriesState state) {
+  return state == SeriesState::kChosen || state == SeriesState::kDrafting || IsBuilt(state);
+}
 
 }  // namespace
 
@@ -320,7 +323,8 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::ChooseOfStudy(const std::
   for (size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i].chosen) {
       const SeriesRule& rule = options_.rules[static_cast<size_t>(verdicts[i].rule)];
-      TF_RETURN_IF_ERROR(Choose(candidates[i], rule.recipe, verdicts[i].reason));
+      TF_RETURN_IF_ERROR(Choose(candidates[i], rule.recipe, verdicts[i].reason,
+                                rule.draft ? SeriesState::kDrafting : SeriesState::kChosen));
     } else {
       TF_RETURN_IF_ERROR(Write(candidates[i], SeriesState::kPassedOver, verdicts[i].reason));
     }
@@ -340,7 +344,7 @@ absl::Status SeriesIntake::KeepHeader(QueuedSeries* series) {
 }
 
 absl::Status SeriesIntake::Choose(QueuedSeries series, const std::string& recipe,
-                                  const std::string& reason) {
+                                  const std::string& reason, SeriesState next) {
   if (series.state == SeriesState::kReceiving || series.state == SeriesState::kIncomplete) {
     return absl::FailedPreconditionError(
         absl::StrCat("series ", series.key, " is ", SeriesStateName(series.state), ": not built"));
@@ -355,7 +359,7 @@ absl::Status SeriesIntake::Choose(QueuedSeries series, const std::string& recipe
   series.recipe = recipe;
   series.attempts = 0;
   series.last_error.clear();
-  return Write(std::move(series), SeriesState::kChosen, reason);
+  return Write(std::move(series), next, reason);
 }
 
 absl::Status SeriesIntake::Write(QueuedSeries series, SeriesState state,

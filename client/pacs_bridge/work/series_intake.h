@@ -73,9 +73,10 @@ class SeriesIntake {
   // ReadInstanceHeader.
   absl::StatusOr<SeriesFacts> FactsOf(const QueuedSeries& series);
 
-  // Makes a series the one that becomes a plan, whatever the rules say: a person has chosen it.
-  // Errors: FailedPrecondition: it is not complete, or no recipe.
-  absl::Status Choose(QueuedSeries series, const std::string& recipe, const std::string& reason);
+  // Makes a series the one that becomes a plan or a draft, against the rules if need be: a person
+  // has chosen it. Errors: FailedPrecondition: it is not complete, or no recipe.
+  absl::Status Choose(QueuedSeries series, const std::string& recipe, const std::string& reason,
+                      SeriesState next = SeriesState::kChosen);
 
  private:
   struct Arrival {

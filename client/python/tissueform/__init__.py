@@ -33,18 +33,21 @@ from .errors import (AccessDenied, Cancelled, Conflict, DataDamaged, DeadlineExc
                      NotFound, ServerError, ServerUnavailable, TissueformError, Unauthenticated)
 from .fitting import Fit, FitTarget, FittedTarget, Freedom  # noqa: E402
 from .local import LocalServer, local  # noqa: E402
-from .meshes import Mesh  # noqa: E402
+from .meshes import Mesh, boundary_triangles  # noqa: E402
+from .plan_builds import BuiltPlan  # noqa: E402
+from .plans import Plan, read_plan  # noqa: E402
 from .poses import Pose, ras_to_lps  # noqa: E402
 from .predictions import Frame, MaterialRanges, Prediction, Prepared  # noqa: E402
 from .prepared_answers import PreparedAnswers  # noqa: E402
 from .sample_meshes import sample_bar  # noqa: E402
 from .sessions import FIXED_BONE, ContactRow, Session  # noqa: E402
 from .stored_predictions import Export, Measure, StoredPrediction  # noqa: E402
+from .volumes import Volume  # noqa: E402
 
 __all__ = [
-    "AccessDenied", "AsyncDrag", "Cancelled", "Client", "Conflict", "ContactRow", "DataDamaged", "DeadlineExceeded", "DoctorLine", "Drag",
-    "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded", "LocalServer",
-    "MaterialRanges", "Measure", "Mesh", "NotFound", "Pose", "Prediction", "Prepared", "PreparedAnswers", "ServerError", "ServerInfo", "ServerUnavailable",
-    "Session", "StoredPrediction", "Tls", "TissueformError", "Unauthenticated", "connect", "doctor", "from_meshio", "local", "ras_to_lps",
-    "sample_bar", "to_meshio", "to_pyvista",
+    "AccessDenied", "AsyncDrag", "BuiltPlan", "Cancelled", "Client", "Conflict", "ContactRow", "DataDamaged", "DeadlineExceeded",
+    "DoctorLine", "Drag", "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded",
+    "LocalServer", "MaterialRanges", "Measure", "Mesh", "NotFound", "Plan", "Pose", "Prediction", "Prepared", "PreparedAnswers",
+    "ServerError", "ServerInfo", "ServerUnavailable", "Session", "StoredPrediction", "Tls", "TissueformError", "Unauthenticated", "Volume",
+    "boundary_triangles", "connect", "doctor", "from_meshio", "local", "ras_to_lps", "read_plan", "sample_bar", "to_meshio", "to_pyvista",
 ]

@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""python3 -m tissueform doctor HOST:PORT"""
+"""python3 -m tissueform doctor [HOST:PORT]"""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from . import Tls, doctor
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Exit codes: 0 done, 1 a check failed, 2 wrong use."""
     parser = argparse.ArgumentParser(prog="python3 -m tissueform", description="Checks the connection to a tissueform-server.")
-    command = parser.add_subparsers(dest="command", required=True).add_parser("doctor", help="from the server's name to a drag")
-    command.add_argument("server", metavar="HOST:PORT")
+    command = parser.add_subparsers(dest="command", required=True).add_parser("doctor", help="from the versions here to a drag on a server")
+    command.add_argument("server", metavar="HOST:PORT", nargs="?", help="without it only the versions of this machine are named")
     command.add_argument("--tls", action="store_true", help="use TLS with this machine's certificate authorities")
     command.add_argument("--tls-ca", metavar="FILE", help="use TLS with the certificate authorities in this file (PEM)")
     command.add_argument("--token-file", metavar="FILE", help="token file, mode 0600")

@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 import re
-from typing import Tuple
+import sys
+from typing import Dict, Tuple
 
 MIN_GRPCIO = "1.49"
 MIN_PROTOBUF = "3.20.2"
-PIP_LINE = f"pip install --upgrade 'grpcio>={MIN_GRPCIO}' 'protobuf>={MIN_PROTOBUF}'"
+PIP_LINE = f"pip install --upgrade 'grpcio>={MIN_GRPCIO}' 'protobuf>={MIN_PROTOBUF}' numpy"
 
 
 def _numbers(version: str) -> Tuple[int, ...]:
@@ -22,12 +23,24 @@ def check_version(package: str, found: str, needed: str) -> None:
         raise ImportError(f"tissueform needs {package} {needed} or newer, found {found}: {PIP_LINE}")
 
 
-def check_libraries() -> None:
-    """Raises ImportError, with the line for pip, if grpcio or protobuf is missing or too old."""
+def library_versions() -> Dict[str, str]:
+    """Raises ImportError, with the line for pip, if a library is missing."""
     try:
         import google.protobuf
         import grpc
+        import numpy
     except ImportError as missing:
-        raise ImportError(f"tissueform needs grpcio and protobuf ({missing}): {PIP_LINE}") from missing
-    check_version("grpcio", grpc.__version__, MIN_GRPCIO)
-    check_version("protobuf", google.protobuf.__version__, MIN_PROTOBUF)
+        raise ImportError(f"tissueform needs grpcio, protobuf and numpy ({missing}): {PIP_LINE}") from missing
+    return {"grpcio": grpc.__version__, "protobuf": google.protobuf.__version__, "numpy": numpy.__version__}
+
+
+def check_libraries() -> None:
+    """Raises ImportError, with the line for pip, if a library is missing or too old; `python3 -m tissueform` ends with that line."""
+    try:
+        found = library_versions()
+        check_version("grpcio", found["grpcio"], MIN_GRPCIO)
+        check_version("protobuf", found["protobuf"], MIN_PROTOBUF)
+    except ImportError as error:
+        if "-m tissueform" in " ".join(getattr(sys, "orig_argv", ())):
+            sys.exit(str(error))
+        raise

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from typing import Any, Dict, Iterator, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Sequence, Tuple, Union
 
 import grpc
 import numpy.typing as npt
@@ -14,9 +14,11 @@ import numpy.typing as npt
 from ._calls import Backoff, Caller
 from ._channel import PathLike, Tls, Token, open_channel
 from .errors import WHERE_IS_IT, DeadlineExceeded, ServerUnavailable, error_of_call
-from .meshes import Mesh, MeshCalls, Progress, mesh_of, upload
+from ._uploads import Progress
+from .meshes import Mesh, MeshCalls, mesh_of, upload
+from .plan_builds import BuiltPlan, PlanBuildCalls, RecipeLike, VolumeLike
 from .sessions import ContactRow, Session, StageProgress, Stiffness, create_session
-from .stored_predictions import Export, ExportCalls, PredictionCalls, StoredPrediction
+from .stored_predictions import ExportCalls, PredictionCalls, StoredPrediction
 from .v1 import server_info_pb2, server_info_pb2_grpc, session_service_pb2, session_service_pb2_grpc
 
 
@@ -46,6 +48,7 @@ class Client:
         self._meshes = MeshCalls(caller)
         self._predictions = PredictionCalls(caller)
         self.exports = ExportCalls(caller)
+        self._plan_builds = PlanBuildCalls(caller)
         self._sessions = caller.stub(session_service_pb2_grpc.SessionServiceStub)
         self._info = caller.stub(server_info_pb2_grpc.ServerInfoServiceStub)
 
@@ -122,6 +125,25 @@ class Client:
         pages = self._caller.pages(self._sessions.ListSessions, session_service_pb2.ListSessionsRequest(), "sessions")
         return (Session(self._caller, message) for message in pages)
 
+    # Plans.
+
+    def build_plan(self, ct: VolumeLike, recipe: RecipeLike, *, labels: Optional[VolumeLike] = None,
+                   files: Optional[Mapping[str, Union[PathLike, bytes]]] = None, title: str = "", project: str = "",
+                   on_progress: Optional[Callable[[str, float], None]] = None) -> BuiltPlan:
+        """Lets the server build a plan and its case from a CT, as `tissueform plan build` does; takes half a minute for a head. Ctrl-C ends
+        the build on the server.
+
+        ct: a Volume of Hounsfield units, or the path of a .nrrd, .nii, .nii.gz or .mha file. Geometry and values are sent, and no text of
+        the file. A DICOM folder is read by `tissueform plan build --server`. recipe: a dict or the path of a file (docs/recipe-format.md).
+        labels: a label map of the CT, as ct. files: those that the recipe names, by their names in it; a recipe that is a file finds them
+        next to itself. They and the recipe are sent as they are. title, project: of the case. on_progress: called with what is being done
+        and the share of the whole, 0 to 1.
+
+        Errors: InvalidInput (a file, a volume, the recipe), NotFound (a file), Conflict (the build failed: the message says why),
+        LimitExceeded (a quota, the queue), Cancelled (ended on the server), ServerError (NOT_IMPLEMENTED: an older server).
+        """
+        return self._plan_builds.build(ct, recipe, labels, files, title, project, on_progress)
+
     # Stored predictions.
 
     def prediction(self, name: str) -> StoredPrediction:
@@ -163,6 +185,8 @@ def _wait_until_answered(client: Client, timeout: float) -> None:
             return
         except grpc.RpcError as raised:
             error = error_of_call(raised)
+        if error.reason == "NOT_IMPLEMENTED":
+            return  # an older server has answered
         if not isinstance(error, (ServerUnavailable, DeadlineExceeded)):
             raise error
         wait = backoff.after(error)

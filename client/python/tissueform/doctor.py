@@ -5,15 +5,17 @@
 from __future__ import annotations
 
 import dataclasses
+import platform
 import random
 import socket
 import time
 from importlib import metadata
-from typing import Any, Callable, List, Union
+from typing import Any, Callable, List, Optional, Union
 
 import numpy as np
 
 from ._channel import Tls
+from ._versions import library_versions
 from .client import Client, connect
 from .errors import TissueformError
 from .poses import Pose
@@ -37,6 +39,13 @@ class DoctorLine:
         finding = self.finding.upper() if self.finding == "failed" else self.finding
         line = f"{finding:<8} {self.check:<11} {self.text}"
         return f"{line}\n{'':20} -> {self.advice}" if self.advice else line
+
+
+def _check_libraries() -> DoctorLine:
+    """Older ones are refused when the package is imported."""
+    found = [f"Python {platform.python_version()}", f"tissueform {metadata.version('tissueform')}"]
+    found += [f"{name} {version}" for name, version in library_versions().items()]
+    return DoctorLine("libraries", "ok", ", ".join(found))
 
 
 def _check_route(address: str) -> DoctorLine:
@@ -88,16 +97,21 @@ def _check_work(client: Client) -> List[DoctorLine]:
     return [DoctorLine("work", "ok", f"a mesh was uploaded, dragged and deleted, in {1000 * (time.monotonic() - start):.0f} ms")]
 
 
-def _lines_of(check: str, ask: Callable[[], List[DoctorLine]]) -> List[DoctorLine]:
+def _lines_of(check: str, ask: Callable[[Client], List[DoctorLine]], client: Client) -> List[DoctorLine]:
     try:
-        return ask()
+        return ask(client)
     except TissueformError as error:
         return [DoctorLine(check, "failed", f"{error.message} ({error.reason})", error.advice)]
 
 
-def doctor(address: str, *, tls: Union[None, bool, Tls] = None, **options: Any) -> List[DoctorLine]:
-    """Asks what works, in order; what cannot be asked because of a failure is left out. Takes the options of connect. Prints nothing."""
-    lines = [] if address.startswith("unix:") else [_check_route(address)]
+def doctor(address: Optional[str] = None, *, tls: Union[None, bool, Tls] = None, **options: Any) -> List[DoctorLine]:
+    """Asks what works, in order; what cannot be asked because of a failure is left out. Without an address only the versions of this
+    machine are named. Takes the options of connect. Prints nothing."""
+    lines = [_check_libraries()]
+    if address is None:
+        return lines
+    if not address.startswith("unix:"):
+        lines.append(_check_route(address))
     if any(line.finding == "failed" for line in lines):
         return lines
     try:
@@ -106,7 +120,7 @@ def doctor(address: str, *, tls: Union[None, bool, Tls] = None, **options: Any) 
         return [*lines, DoctorLine("health", "failed", f"{error.message} ({error.reason})", error.advice)]
     with client:
         for check, ask in (("login", _check_login), ("version", _check_server), ("work", _check_work)):
-            lines += _lines_of(check, lambda: ask(client))
+            lines += _lines_of(check, ask, client)
             if any(line.finding == "failed" for line in lines):
                 break
     return lines

@@ -146,6 +146,7 @@ class Drag:
             if frame is None:
                 raise ServerUnavailable("the drag ended before the pose was answered", advice="open another drag")
             if frame.sequence >= sequence and not (final and frame.refining):
+                self._acknowledge()
                 return frame
 
     def close(self) -> None:
@@ -193,6 +194,11 @@ class Drag:
                 return None
             stream.unacknowledged = deform_service_pb2.FrameAck(sequence=message.sequence, refinement=message.refinement)
             return frame_of(message, self.vertices)
+
+    def _acknowledge(self) -> None:
+        """At once, not with the next pose: the server needs the acknowledgment before it may answer that one."""
+        if self._stream is not None:
+            self._stream.acknowledge()
 
     def _next_frame(self, stream: _Stream) -> Optional[deform_service_pb2.DeformFrame]:
         for response in stream.call:

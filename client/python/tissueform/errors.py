@@ -60,7 +60,7 @@ ADVICE: Mapping[str, str] = {
     "DEADLINE_PASSED": "give call_timeout more seconds, or try later",
     "PERMISSION_DENIED": "ask the owner, or the server's operator, for this right",
     "UNAUTHENTICATED": "log in again (`tissueform login`) and connect with the new token",
-    "NOT_IMPLEMENTED": "use a newer server",
+    "NOT_IMPLEMENTED": "update the server, or use the package of its version",
     "INTERNAL_ERROR": "report this defect to the server's operator",
 }
 WHERE_IS_IT = "check the address and whether the server runs: `python3 -m tissueform doctor HOST:PORT`"
@@ -170,6 +170,8 @@ def error_of_call(error: grpc.RpcError, *, was_cancelled: bool = False) -> Tissu
     if code == 1 and not was_cancelled:
         code = 14
         details.reason = "" if details.reason == "CANCELLED" else details.reason
+    if code == 12 and not details.reason:
+        message = "this server is older than this package and does not have this call"
     reason = details.reason or _REASON_OF_CODE.get(code, "")
     advice = WHERE_IS_IT if code == 14 and not details.reason else ""
     return _CLASSES.get(code, ServerError)(message.replace("\n", " "), reason=reason, advice=advice, metadata=details.metadata)

@@ -92,8 +92,8 @@ def _freedom_to_proto(handle: str, freedom: Freedom) -> plan_service_pb2.FitFree
     return message
 
 
-def fit_request(session: str, mesh_vertices: int, targets: Sequence[FitTarget], freedoms: Mapping[str, Freedom], poses: Sequence[geometry_pb2.HandlePose],
-                symmetric: bool, tolerance_mm: float, model: Any, verify: bool) -> plan_service_pb2.FitRequest:
+def fit_request(session: str, mesh_vertices: int, targets: Sequence[FitTarget], freedoms: Mapping[str, Freedom],
+                poses: Sequence[geometry_pb2.HandlePose], symmetric: bool, tolerance_mm: float, model: Any, verify: bool) -> plan_service_pb2.FitRequest:
     """Errors: InvalidInput."""
     return plan_service_pb2.FitRequest(
         session=session, targets=[_target_to_proto(target, mesh_vertices) for target in targets],

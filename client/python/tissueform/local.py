@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import threading
 import time
-from typing import Any, Deque, Optional, Sequence
+from typing import Any, Deque, Mapping, Optional, Sequence
 
 from ._channel import PathLike
 from .client import Client, connect
@@ -97,18 +97,21 @@ class LocalServer:
         self.address = text.decode().splitlines()[0].replace("listening on ", "")
 
 
-def local(program: Optional[PathLike] = None, *, options: Sequence[str] = (), timeout: float = 30.0) -> LocalServer:
+def local(program: Optional[PathLike] = None, *, options: Sequence[str] = (), timeout: float = 30.0,
+          environment: Optional[Mapping[str, str]] = None) -> LocalServer:
     """Starts a tissueform-server of this machine as a child, on a free port of loopback, which stores nothing on the disk.
 
     program: path of tissueform-server (default: the environment's TISSUEFORM_SERVER_PROGRAM, or the one in PATH). options: more options of
-    the command line, for example ["--memory-budget-mib", "4096"]. timeout: seconds until it must be ready. Linux only.
+    the command line, for example ["--memory-budget-mib", "4096"]. timeout: seconds until it must be ready. environment:
+    variables of the server (default: those of this process). Linux only.
 
     Errors: NotFound (no such program), ServerUnavailable (it did not start; the message has its last line).
     """
     binary = _find_server(program)
     command = [str(_find_guard(binary)), str(_GRACE_MS), "0", "0", "0", str(binary), "--host", "127.0.0.1", "--port", "0", "--in-memory", *options]
     # The guard ends the server when this pipe closes, so also when this process is killed.
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+                               env=environment)
     server = LocalServer(process)
     try:
         server._wait_until_listening(timeout)

@@ -6,24 +6,21 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import time
-from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Tuple, Union
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple, Union
 
 import grpc
 import numpy as np
 import numpy.typing as npt
 
-from ._calls import Backoff, Caller
-from .errors import DataDamaged, DeadlineExceeded, InvalidInput, LimitExceeded, NotFound, TissueformError, error_of_call, is_transient
+from ._calls import Caller
+from ._uploads import CHUNK_BYTES, Progress, report, send_resumable
+from .errors import DataDamaged, InvalidInput, NotFound, error_of_call
 from .v1 import mesh_service_pb2, mesh_service_pb2_grpc
 
 Points = npt.NDArray[np.float64]
 Tets = npt.NDArray[np.int32]
-Progress = Callable[[int, int], None]
 
 STIFFNESS_ARRAY = "youngs_modulus_pa"
-_CHUNK_BYTES = 512 << 10
-_GIVE_UP_SECONDS = 60.0
 # Of a mesh's bounding box in mm: a head in meters is 0.3, one in micrometers 300,000.
 _SMALLEST_DIAGONAL_MM, _LARGEST_DIAGONAL_MM = 2.0, 10_000.0
 
@@ -93,6 +90,14 @@ def check_tets(tets: npt.ArrayLike, points: Points) -> Tets:
     return checked
 
 
+def boundary_triangles(tets: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    """The triangles that belong to one tet only, (#, 3), in the numbers of the mesh; they face outward where tets are positive."""
+    corners = np.asarray(tets, dtype=np.int32)
+    triangles = corners[:, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]].reshape(-1, 3)
+    _, first, counts = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(triangles[np.sort(first[counts == 1])])
+
+
 def check_cell_array(values: npt.ArrayLike, name: str, tet_count: int) -> npt.NDArray[np.float64]:
     checked = as_array(values, f'cell array "{name}"', np.float64)
     if checked.shape != (tet_count,) or not np.isfinite(checked).all():
@@ -126,33 +131,17 @@ class Payload:
         yield mesh_service_pb2.UploadMeshRequest(header=self.header)
         start = 0
         for segment in self._segments:
-            for at in range(max(begin - start, 0), len(segment), _CHUNK_BYTES):
-                data = bytes(segment[at:at + _CHUNK_BYTES])
+            for at in range(max(begin - start, 0), len(segment), CHUNK_BYTES):
+                data = bytes(segment[at:at + CHUNK_BYTES])
                 yield self._chunk(start + at, data)
-                if on_progress is not None:
-                    self._report(on_progress, start + at + len(data))
+                report(self, on_progress, start + at + len(data))
             start += len(segment)
         if begin >= self.total_bytes:
             yield self._chunk(begin, b"")
 
-    def _report(self, on_progress: Progress, sent_bytes: int) -> None:
-        try:
-            on_progress(sent_bytes, self.total_bytes)
-        except BaseException as failure:
-            self.failure = failure
-            raise
-
     def _chunk(self, offset: int, data: bytes) -> mesh_service_pb2.UploadMeshRequest:
         last = offset + len(data) == self.total_bytes
         return mesh_service_pb2.UploadMeshRequest(chunk=mesh_service_pb2.MeshChunk(write_offset=offset, data=data, finish_write=last))
-
-
-def _may_repeat(error: TissueformError, damaged_before: bool) -> bool:
-    if isinstance(error, DataDamaged):
-        return not damaged_before
-    if error.reason in ("UPLOAD_NOT_FOUND", "CHUNK_OUT_OF_PLACE", "CHANGED_MEANWHILE", "UPLOAD_UNDER_WAY"):
-        return True
-    return isinstance(error, DeadlineExceeded) or (is_transient(error) and not isinstance(error, LimitExceeded))
 
 
 class MeshCalls:
@@ -177,26 +166,9 @@ class MeshCalls:
             return self.get(payload.name)
         except NotFound:
             pass
-        backoff, damaged_before = Backoff(), False
-        give_up = time.monotonic() + _GIVE_UP_SECONDS
-        committed = 0
-        while True:
-            try:
-                begin = self._committed_bytes(payload)
-                if begin > committed:  # the last attempt was of use
-                    committed, give_up = begin, time.monotonic() + _GIVE_UP_SECONDS
-                response = self._stub.UploadMesh(payload.requests(begin, on_progress), timeout=self._caller.call_timeout,
-                                                 metadata=self._caller.metadata(""))
-                return response.mesh
-            except grpc.RpcError as raised:
-                error = error_of_call(raised)
-            if payload.failure is not None:
-                raise payload.failure
-            wait = backoff.after(error)
-            if not _may_repeat(error, damaged_before) or time.monotonic() + wait > give_up:
-                raise error
-            damaged_before = damaged_before or isinstance(error, DataDamaged)
-            time.sleep(wait)
+        def call(requests: Iterator[Any]) -> Any:
+            return self._stub.UploadMesh(requests, timeout=self._caller.call_timeout, metadata=self._caller.metadata(""))
+        return send_resumable(payload, lambda: self._committed_bytes(payload), call, on_progress).mesh
 
     def _committed_bytes(self, payload: Payload) -> int:
         """Where the upload continues."""

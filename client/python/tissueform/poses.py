@@ -73,11 +73,15 @@ def poses_of(messages: Iterable[geometry_pb2.HandlePose]) -> Dict[str, Pose]:
                                  message.scale if message.HasField("scale") else 1.0) for message in messages}
 
 
-def ras_to_lps(points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Points or directions, (#V, 3) or (3,), from RAS (right, anterior, superior are positive; 3D Slicer, NIfTI) to LPS (left,
-    posterior, superior; DICOM, tissueform). The same function converts back. It is a half turn about z: tets stay positive."""
-    lps: Any = np.array(points, dtype=np.float64)
+def ras_to_lps(given: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Points or directions, (#V, 3) or (3,), or a transform of points, (4, 4), from RAS (right, anterior, superior are positive; 3D
+    Slicer, NIfTI) to LPS (left, posterior, superior; DICOM, tissueform). The same function converts back. It is a half turn about z:
+    tets stay positive."""
+    lps: Any = np.array(given, dtype=np.float64)
+    if lps.shape == (4, 4):
+        half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+        return half_turn @ lps @ half_turn  # type: ignore[no-any-return]
     if lps.ndim not in (1, 2) or lps.shape[-1] != 3:
-        raise InvalidInput(f"points have the shape {lps.shape}: expected (#V, 3) or (3,)")
+        raise InvalidInput(f"points have the shape {lps.shape}: expected (#V, 3) or (3,), or (4, 4) for a transform")
     lps[..., :2] *= -1
     return lps  # type: ignore[no-any-return]

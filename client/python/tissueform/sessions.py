@@ -10,7 +10,7 @@ from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Seque
 from ._calls import Caller, new_id
 from .async_drag import AsyncDrag
 from .drag import Drag, Notice
-from .errors import InvalidInput, NotFound, ServerUnavailable, TissueformError
+from .errors import InvalidInput, NotFound, ServerError, ServerUnavailable, TissueformError
 from .fitting import Fit, FitTarget, Freedom, fit_of, fit_request
 from .meshes import Mesh, check_stiffness
 from .poses import Pose, Poses, Vector, poses_of, poses_to_proto, vector_to_proto
@@ -230,4 +230,9 @@ def create_session(caller: Caller, mesh: Mesh, handles: Mapping[str, Any], fixed
         request_id=new_id())
     stub = caller.stub(session_service_pb2_grpc.SessionServiceStub)
     whole = session_service_pb2.PrepareSessionRequest(create=request)
-    return Session(caller, prepare(caller, stub, whole, "", on_progress, repeat_if_lost=True))
+    try:
+        return Session(caller, prepare(caller, stub, whole, "", on_progress, repeat_if_lost=True))
+    except ServerError as error:
+        if error.reason != "NOT_IMPLEMENTED":
+            raise
+    return Session(caller, caller.unary(stub.CreateSession, request))  # version 0.1 does not tell its stages

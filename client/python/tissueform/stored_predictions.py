@@ -8,8 +8,6 @@ import dataclasses
 import datetime
 from typing import Any, Dict, Iterator, Optional, Sequence
 
-import numpy as np
-
 from ._calls import Caller, new_id
 from .errors import DataDamaged
 from .poses import Pose, poses_of
@@ -108,7 +106,8 @@ class StoredPrediction:
                 vertices: Vertices = "all") -> prediction_pb2.PredictionComparison:
         """Distances to another prediction of the same mesh, or to what another model answers to the same poses
         (v1.PredictionComparison: distances.mean_mm, p95_mm, max_mm, ...). Errors: Conflict (NOT_COMPARABLE), NotFound, InvalidInput."""
-        request = prediction_service_pb2.ComparePredictionsRequest(prediction=self.name, vertices=selection_to_proto(vertices, self.description.vertex_count))
+        selection = selection_to_proto(vertices, self.description.vertex_count)
+        request = prediction_service_pb2.ComparePredictionsRequest(prediction=self.name, vertices=selection)
         if other is not None:
             request.other_prediction = other.name
         else:

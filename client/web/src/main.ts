@@ -6,6 +6,7 @@ import "./styles/start.css";
 import "./styles/planner.css";
 import "./styles/panel.css";
 import "./styles/report.css";
+import { fetchDraft } from "./building/build_drafts";
 import { Bearer } from "./calls/bearer";
 import { Code, messageOf, toCallError } from "./calls/call_error";
 import { Gateway, baseOf } from "./calls/gateway";
@@ -32,6 +33,8 @@ import type { Workbench } from "./workbench/workbench";
 //   nothing                            the list of cases
 //   #case={sha256}                     the planner of a case
 //   #case={sha256}&contact=off         the same, where tissue sticks and lips are one piece; so with followers
+//   #new                               a new plan from a CT
+//   #new&draft={id}                    the same, of a CT that waits on the server
 //   #follow={session}&case={sha256}    read-only, beside somebody who plans; where the server has logins, the link's token
 //                                      stands in the session's place, and nobody needs to sign in
 
@@ -40,6 +43,9 @@ interface TestHook {
   bench?: Workbench;
   follower?: unknown;
   view?: unknown;
+  /** What reads a CT. */
+  volume: () => Promise<typeof import("./volume/opened_ct")>;
+  draft?: unknown;
 }
 
 /** The page's own path: a proxy may have it below one of its own. */
@@ -48,7 +54,7 @@ const gateway = new Gateway(base, new Bearer());
 /** Null where nobody logs in. */
 let login: Login | null = null;
 let banner: HTMLElement | null = null;
-const hook: TestHook = {};
+const hook: TestHook = { volume: () => pagePart(() => import("./volume/opened_ct")) };
 (globalThis as unknown as { tissueform: TestHook }).tissueform = hook;
 
 async function start(): Promise<void> {
@@ -77,15 +83,16 @@ async function signIn(): Promise<boolean> {
   return user.state.kind === "in";
 }
 
-function parameters(): { caseId: string; follow: string; sticks: boolean } {
+function parameters(): { caseId: string; follow: string; sticks: boolean; isNew: boolean; draftId: string } {
   const all = new URLSearchParams(location.hash.slice(1));
-  return { caseId: all.get("case") ?? "", follow: all.get("follow") ?? "", sticks: all.get("contact") === "off" };
+  return { caseId: all.get("case") ?? "", follow: all.get("follow") ?? "", sticks: all.get("contact") === "off", isNew: all.has("new"), draftId: all.get("draft") ?? "" };
 }
 
 async function route(): Promise<void> {
-  const { caseId, follow } = parameters();
+  const { caseId, follow, isNew, draftId } = parameters();
+  if (isNew) return openNewPlan(draftId);
   if (!/^[0-9a-f]{64}$/.test(caseId)) {
-    show(casesPage(gateway, (entry) => go(entry.name.replace("cases/", "")), account()));
+    show(casesPage(gateway, (entry) => go(entry.name.replace("cases/", "")), (draft) => (location.hash = draft === null ? "new" : `new&draft=${draft.name.replace("buildDrafts/", "")}`), account()));
     return;
   }
   const name = `cases/${caseId}`;
@@ -96,6 +103,18 @@ async function route(): Promise<void> {
   } catch (thrown) {
     const buttons = [button("Try again", () => void route()), button("Cases", () => (location.hash = ""))];
     showProblem("The case cannot be opened", thrown, buttons);
+  }
+}
+
+async function openNewPlan(draftId: string): Promise<void> {
+  try {
+    const received = draftId === "" ? null : await fetchDraft(gateway, `buildDrafts/${draftId}`);
+    const { newPlanPage } = await pagePart(() => import("./pages/new_plan_page"));
+    const { element, draft } = newPlanPage(gateway, received, (name) => go(name.replace("cases/", "")), () => (location.hash = ""), account());
+    hook.draft = draft;
+    show(element);
+  } catch (thrown) {
+    showProblem("A new plan cannot be begun", thrown, [button("Try again", () => void route()), button("Cases", () => (location.hash = ""))]);
   }
 }
 

@@ -9,10 +9,15 @@
 #include <fstream>
 #include <new>
 #include <poll.h>
+#include <string>
 #include <thread>
 #include <unistd.h>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "absl/strings/strip.h"
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -72,16 +77,41 @@ absl::StatusOr<IsolationLimits> ReceiveLimits(PipeReceiver* request) {
 
 }  // namespace
 
+namespace {
+
+absl::Status NeedsMoreMemory(absl::string_view what, const IsolationLimits& limits) {
+  return absl::ResourceExhaustedError(
+      absl::StrCat(what, " needs more than ", limits.max_memory_bytes, " bytes of memory"));
+}
+
+// Libraries with threads of their own turn bad_alloc into errors of theirs. Whoever has had most of
+// what it may take when it gives up, has given up for that.
+bool HasTakenMost(const IsolationLimits& limits) {
+  constexpr int64_t kBytesPerKibibyte = 1024;
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    absl::string_view rest = line;
+    int64_t peak = 0;
+    if (!absl::ConsumePrefix(&rest, "VmPeak:") || !absl::ConsumeSuffix(&rest, "kB")) continue;
+    if (!absl::SimpleAtoi(absl::StripAsciiWhitespace(rest), &peak)) return false;
+    return peak >= limits.max_memory_bytes / kBytesPerKibibyte / 4 * 3;
+  }
+  return false;
+}
+
+}  // namespace
+
 absl::Status WithoutExceptions(absl::string_view what, const IsolationLimits& limits,
                                const std::function<absl::Status()>& work) {
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat(what, " needs more than ", limits.max_memory_bytes, " bytes of memory"));
+    return NeedsMoreMemory(what, limits);
   } catch (const std::exception& exception) {
+    if (HasTakenMost(limits)) return NeedsMoreMemory(what, limits);
     return absl::InvalidArgumentError(
-        absl::StrCat("the library gave up while ", what, " (", exception.what(), ")"));
+        absl::StrCat("the library gave up while ", what, " (",
+                     absl::StrReplaceAll(exception.what(), {{"\n", " "}}), ")"));
   } catch (...) {  // TetGen throws numbers
     return absl::InvalidArgumentError(
         absl::StrCat("the library gave up while ", what, "; it is damaged"));

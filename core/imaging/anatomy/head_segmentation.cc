@@ -73,12 +73,14 @@ LabelGrid OutsideAir(const LabelGrid& head) {
 }
 
 // Of the head's voxels that touch the outside air, the share that has bone within kBareWithinMm.
-double BareFraction(const LabelGrid& head, const LabelGrid& bone) {
+// Bone that the field of view cuts is not bare.
+double BareFraction(const LabelGrid& head, const LabelGrid& bone, const LabelGrid& cut) {
   const FloatGrid to_air = DistanceMm(OutsideAir(head));
   const FloatGrid to_bone = DistanceMm(bone);
   int64_t surface = 0;
   int64_t bare = 0;
   for (size_t i = 0; i < head.values.size(); ++i) {
+    if (!cut.values.empty() && cut.values[i] != 0) continue;
     if (head.values[i] == 0 || to_air.values[i] > 1.01 * head.geometry.spacing_mm) continue;
     ++surface;
     if (to_bone.values[i] <= kBareWithinMm) ++bare;
@@ -175,7 +177,7 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   result.streaks_mm3 = RemoveStreaks(&result);
   TF_RETURN_IF_ERROR(CheckBone(result.bone, options.bone_above_hu));
   TellStage(tell, "checking for skin", 0.8);
-  result.bare_fraction = BareFraction(result.head, result.bone);
+  result.bare_fraction = BareFraction(result.head, result.bone, result.cut);
   TF_RETURN_IF_ERROR(CheckSkin(result.bare_fraction));
   return result;
 }

@@ -81,7 +81,7 @@ class JawLandmarkFinder {
   absl::Status FindAll() {
     TF_RETURN_IF_ERROR(FindLowerIncisor());
     TF_RETURN_IF_ERROR(FindTeeth());
-    FindTeethPlanes();
+    landmarks_.SetTeethPlanes();
     TF_RETURN_IF_ERROR(FindLastUpperTooth());
     TF_RETURN_IF_ERROR(FindChin());
     TF_RETURN_IF_ERROR(FindSide(1, &LeftAndRight::left));
@@ -150,22 +150,6 @@ class JawLandmarkFinder {
                                   "an upper molar", &(l.upper_molar.*member)));
     }
     return absl::OkStatus();
-  }
-
-  // Through the incisor and the middle of the molars, square to the midline: a molar more or less
-  // on one side would tilt it.
-  Plane ThroughTeeth(const Eigen::Vector3d& incisor, const LeftAndRight& molar) const {
-    const Eigen::Vector3d molars = (molar.left + molar.right) / 2;
-    const Eigen::Vector3d& left = landmarks_.midsagittal.normal;
-    return {(incisor + 2 * molars) / 3, left.cross(molars - incisor).normalized()};
-  }
-
-  void FindTeethPlanes() {
-    Landmarks& l = landmarks_;
-    l.lower_teeth = ThroughTeeth(l.lower_incisor, l.lower_molar);
-    l.upper_teeth = ThroughTeeth(l.upper_incisor, l.upper_molar);
-    l.occlusal.point_mm = (l.lower_teeth.point_mm + l.upper_teeth.point_mm) / 2;
-    l.occlusal.normal = (l.lower_teeth.normal + l.upper_teeth.normal).normalized();
   }
 
   // At the height of the crowns, under the pterygoid plates, which would pass for teeth: a Le Fort

@@ -28,7 +28,22 @@ LabelGrid FacialBone(const LabelGrid& parts, const VoxelBox& mandible) {
   return face;
 }
 
+// Through the incisor and the middle of the molars, square to the midline: a molar more or less
+// on one side would tilt it.
+Plane ThroughTeeth(const Eigen::Vector3d& incisor, const LeftAndRight& molar,
+                   const Eigen::Vector3d& left) {
+  const Eigen::Vector3d molars = (molar.left + molar.right) / 2;
+  return {(incisor + 2 * molars) / 3, left.cross(molars - incisor).normalized()};
+}
+
 }  // namespace
+
+void Landmarks::SetTeethPlanes() {
+  lower_teeth = ThroughTeeth(lower_incisor, lower_molar, midsagittal.normal);
+  upper_teeth = ThroughTeeth(upper_incisor, upper_molar, midsagittal.normal);
+  occlusal.point_mm = (lower_teeth.point_mm + upper_teeth.point_mm) / 2;
+  occlusal.normal = (lower_teeth.normal + upper_teeth.normal).normalized();
+}
 
 Eigen::Vector3d Landmarks::ForwardOf(const Plane& plane) const {
   return midsagittal.normal.cross(plane.normal).normalized();

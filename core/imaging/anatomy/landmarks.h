@@ -55,6 +55,9 @@ struct Landmarks {
   double nose_prominence_mm = 0;
   LeftAndRight mouth_corner;  // an estimate: the skin 25 mm beside the midline between the lips
 
+  // Sets the three planes through the teeth from incisors, molars and the midsagittal plane.
+  void SetTeethPlanes();
+
   // Forward in the midsagittal plane, square to the normal of a plane that looks up.
   Eigen::Vector3d ForwardOf(const Plane& plane) const;
 };

@@ -7,6 +7,7 @@
 
 #include "core/base/types.h"
 #include "core/imaging/anatomy/landmarks.h"
+#include "core/imaging/anatomy/mouth_line.h"
 #include "core/mesh/skin_region.h"
 
 namespace tissueform {
@@ -21,7 +22,10 @@ namespace tissueform {
 //   front chin       |x| < 28 mm, below that, down to 12 mm under the bone's menton cheeks beyond
 //   that on their side, from the chin's front up to 20 mm over the nose's tip
 // Lips, chin and cheeks reach from the front to so far behind the corners of the mouth: lips 14,
-// chin 20, cheeks 55 mm. "Between the lips" is midway between the foremost points of both.
-std::vector<SkinRegion> NameSkinRegions(const Positions& positions_mm, const Landmarks& landmarks);
+// chin 20, cheeks 55 mm. "Between the lips" is the mouth line where half of it is seen, beyond its
+// corners their height; otherwise it is midway between the foremost points of both lips, which may
+// be 5 to 8 mm off on jaws without teeth. `mouth` may be null.
+std::vector<SkinRegion> NameSkinRegions(const Positions& positions_mm, const Landmarks& landmarks,
+                                        const MouthLine* mouth = nullptr);
 
 }  // namespace tissueform

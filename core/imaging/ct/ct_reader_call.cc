@@ -75,6 +75,7 @@ void SendVolume(const absl::StatusOr<CtVolume>& volume, PipeSender* sender) {
     sender->Bytes(origin.data(), sizeof(origin));
   }
   sender->Text(volume->frame_uid);
+  sender->Number(volume->has_gray_values ? 1 : 0);
   SendProvenance(volume->provenance, sender);
   sender->Bytes(volume->hu.data(), volume->hu.size() * sizeof(int16_t));
 }
@@ -90,6 +91,8 @@ absl::StatusOr<CtVolume> ReceiveVolume(int descriptor, int64_t max_voxels) {
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.direction.data(), sizeof(volume.direction)));
   TF_RETURN_IF_ERROR(ReceiveSliceOrigins(&receiver, &volume));
   TF_ASSIGN_OR_RETURN(volume.frame_uid, receiver.Text());
+  TF_ASSIGN_OR_RETURN(const int64_t is_gray, receiver.Number(1));
+  volume.has_gray_values = is_gray != 0;
   TF_RETURN_IF_ERROR(ReceiveProvenance(&receiver, &volume.provenance));
   volume.hu.resize(static_cast<size_t>(volume.num_voxels()));
   TF_RETURN_IF_ERROR(receiver.Bytes(volume.hu.data(), volume.hu.size() * kVoxelBytes));
@@ -115,6 +118,7 @@ void SendRequest(const std::string& path, const CtReadOptions& options, PipeSend
   sender->Text(options.axes);
   SendOptional(options.series_number, sender);
   sender->Number(static_cast<int64_t>(options.join_series));
+  sender->Number(static_cast<int64_t>(options.values));
   sender->Bytes(&options.limits, sizeof(options.limits));
 }
 
@@ -131,6 +135,8 @@ absl::StatusOr<CtReadRequest> ReceiveRequest(PipeReceiver* receiver) {
   TF_RETURN_IF_ERROR(ReceiveOptional(receiver, &request.options.series_number));
   TF_ASSIGN_OR_RETURN(const int64_t join, receiver->Number(2));
   request.options.join_series = static_cast<JoinSeries>(join);
+  TF_ASSIGN_OR_RETURN(const int64_t values, receiver->Number(2));
+  request.options.values = static_cast<CtValues>(values);
   static_assert(std::is_trivially_copyable_v<CtReadLimits>);
   TF_RETURN_IF_ERROR(receiver->Bytes(&request.options.limits, sizeof(request.options.limits)));
   return request;

@@ -10,7 +10,6 @@
 #include "core/imaging/ct/ct_reader_call.h"
 #include "core/imaging/ct/dicom_volume_reader.h"
 #include "core/imaging/ct/file_bytes.h"
-#include "core/imaging/ct/hu_check.h"
 #include "core/imaging/ct/volume_file_reader.h"
 
 namespace tissueform {
@@ -21,10 +20,8 @@ absl::StatusOr<CtVolume> Read(const std::string& given_path, const CtReadOptions
   const bool is_folder = std::filesystem::is_directory(path);
   if (!is_folder && IsLfsPointerFile(path)) return absl::InvalidArgumentError(kLfsPointerMessage);
   const std::optional<VolumeFormat> format = VolumeFormatOfPath(path);
-  TF_ASSIGN_OR_RETURN(CtVolume volume, !is_folder && format ? ReadVolumeFile(path, *format, options)
-                                                            : ReadDicomVolume(path, options));
-  TF_RETURN_IF_ERROR(CheckHu(volume.hu, options.hu_offset));
-  return volume;
+  return !is_folder && format ? ReadVolumeFile(path, *format, options)
+                              : ReadDicomVolume(path, options);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,15 @@ struct CtProvenance {
   std::vector<SliceGap> wide_gaps;
 };
 
+// The field of view of a cone-beam scanner: a cylinder along an axis of the file.
+struct CylinderField {
+  int axis = 2;
+  // Of its axis, along the other two axes of the file, in rising order.
+  Eigen::Vector2d center_voxels = Eigen::Vector2d::Zero();
+  double radius_mm = 0;
+  int16_t outside_value = 0;  // in the file
+};
+
 // A CT volume as it was read: nothing resampled, axes as in the file.
 struct CtVolume {
   std::array<int, 3> size = {0, 0, 0};                   // voxels along the file's axes i, j, k
@@ -66,6 +76,9 @@ struct CtVolume {
   // DICOM's frame of reference, to compare with that of a label map; empty for other files. Never
   // in a message or report.
   std::string frame_uid;
+
+  bool has_gray_values = false;        // `hu` holds the file's values, which are not HU
+  std::optional<CylinderField> field;  // set by PrepareValues (core/imaging/ct/gray_values.h)
 
   CtProvenance provenance;
 

@@ -31,6 +31,13 @@ enum class JoinSeries {
   kNever,
 };
 
+// What the numbers of the file are.
+enum class CtValues {
+  kAuto,  // HU if they can be: air and soft tissue are where they are in HU
+  kHu,
+  kGray,  // of a cone-beam scanner without calibration
+};
+
 // What the file cannot say; keys of the recipe have the same names.
 struct CtReadOptions {
   // Added to the values of a file that does not state how they become HU: -1024 for HU + 1024.
@@ -46,6 +53,11 @@ struct CtReadOptions {
 
   JoinSeries join_series = JoinSeries::kAuto;
 
+  CtValues values = CtValues::kAuto;
+  // In the file's gray values; found from the image if not given (core/imaging/ct/gray_values.h).
+  std::optional<double> tissue_above_gray;
+  std::optional<double> bone_above_gray;
+
   CtReadLimits limits;
 };
 
@@ -53,8 +65,10 @@ struct CtReadOptions {
 // file of it (then the series of that file), or a file of NIfTI (.nii, .nii.gz), NRRD (.nrrd,
 // .nhdr) or MetaImage (.mha, .mhd). Values are HU: DICOM's rescale slope and intercept, or those of
 // NIfTI, are applied, then `hu_offset`; values under -1024 (outside the scanner's circle) become
-// -1024. Places come from position and orientation, never from the slice thickness. The libraries
-// (ITK, GDCM) work in a helper program within the limits. Any thread may call it.
+// -1024. Where `values` is kGray, or kAuto and they cannot be HU, they stay as they are, within
+// int16_t (CtVolume::has_gray_values). Places come from position and orientation, never from the
+// slice thickness. The libraries (ITK, GDCM) work in a helper program within the limits. Any thread
+// may call it.
 //
 // Errors: NotFound when there is no such path; ResourceExhausted beyond a limit; InvalidArgument
 // for everything that cannot be used as a CT volume, in one line: what was found, where, what to

@@ -18,6 +18,7 @@ namespace {
 constexpr uint32_t kSharedGroups = 0x52009229;
 constexpr uint32_t kGroupsOfFrames = 0x52009230;
 constexpr uint32_t kNumberOfFrames = 0x00280008;
+constexpr uint32_t kSliceThickness = 0x00180050;
 constexpr uint32_t kSpacingBetweenSlices = 0x00180088;
 constexpr int kMaxFrames = 65535;  // of one file: more than any scanner writes
 
@@ -78,7 +79,8 @@ void ReadValuesAndKind(const gdcm::DataSet& groups, DicomHeader* frame) {
 // of the first frame at the top level, and the frames follow along the normal.
 std::vector<DicomHeader> EvenFrames(const gdcm::DataSet& data, const DicomHeader& file) {
   const int count = IntegerOf(data, kNumberOfFrames).value_or(0);
-  const std::optional<double> spacing_mm = NumberOf(data, kSpacingBetweenSlices);
+  std::optional<double> spacing_mm = NumberOf(data, kSpacingBetweenSlices);
+  if (!spacing_mm) spacing_mm = NumberOf(data, kSliceThickness);
   if ((!file.class_uid.empty() && file.class_uid != kCtImageClass) || count < 2 ||
       count > kMaxFrames || !file.position_mm || !file.axes || !spacing_mm || *spacing_mm == 0) {
     return {};

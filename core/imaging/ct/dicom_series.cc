@@ -352,8 +352,10 @@ void AddNotes(const Candidate& chosen, const std::vector<SliceGroup>& aside, Dic
   if (stack->slices.front().even_frames) {
     stack->notes.push_back(absl::StrCat(
         "a multi-frame file without a position for each frame: its ", stack->slices.size(),
-        " frames are placed by SpacingBetweenSlices along the normal of the first, toward its "
-        "positive side; check that the head is not upside down"));
+        " frames are placed by SpacingBetweenSlices (by SliceThickness where that is missing) "
+        "along "
+        "the normal of the first, toward its positive side; check that the head is not upside "
+        "down"));
   }
   if (chosen.group.num_series > 1) {
     stack->notes.push_back(absl::StrCat(
@@ -361,8 +363,12 @@ void AddNotes(const Candidate& chosen, const std::vector<SliceGroup>& aside, Dic
         " series are read as one: they are of one patient, size and orientation, and their places "
         "fit (\"join_series\": \"never\" keeps series apart)"));
   }
-  for (size_t s = 1; s < chosen.scans.size(); ++s) {
-    stack->notes.push_back(absl::StrCat("left out: ", DescribeScan(chosen.scans[s])));
+  // The largest comes first.
+  if (chosen.scans.size() > 1) {
+    const size_t more = chosen.scans.size() - 2;
+    stack->notes.push_back(
+        absl::StrCat("left out: ", DescribeScan(chosen.scans[1]),
+                     more > 0 ? absl::StrCat("; and ", more, " more such scans") : ""));
   }
   if (!aside.empty()) stack->notes.push_back(absl::StrCat("ignored: ", DescribeAll(aside)));
 }

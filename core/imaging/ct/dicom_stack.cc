@@ -41,22 +41,23 @@ const char* MissingTag(const DicomHeader& slice) {
 bool HasRescale(const DicomHeader& slice) { return slice.rescale_slope || slice.rescale_intercept; }
 
 // `any_states`: some slice of the stack says how. Then an offset for all others would be a guess.
-absl::Status CheckRescale(const DicomHeader& slice, bool any_states, bool has_offset) {
+absl::Status CheckRescale(const DicomHeader& slice, bool any_states, bool may_lack_rescale) {
   const bool usable = slice.rescale_intercept && slice.rescale_slope.value_or(1) != 0;
-  if (usable || (!any_states && has_offset)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      NameOf(slice), " has no calibration to HU (RescaleSlope, RescaleIntercept)",
-      any_states ? "; export the series again" : "; state \"hu_offset\" in the recipe"));
+  if (usable || (!any_states && may_lack_rescale)) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(NameOf(slice), " has no calibration to HU (RescaleSlope, RescaleIntercept)",
+                   any_states ? "; export the series again"
+                              : "; state \"hu_offset\" in the recipe, or \"values\": \"gray\""));
 }
 
-absl::Status CheckTags(const std::vector<DicomHeader>& slices, bool has_offset) {
+absl::Status CheckTags(const std::vector<DicomHeader>& slices, bool may_lack_rescale) {
   const bool any_states = std::any_of(slices.begin(), slices.end(), HasRescale);
   for (const DicomHeader& slice : slices) {
     if (const char* const missing = MissingTag(slice)) {
       return absl::InvalidArgumentError(
           absl::StrCat(NameOf(slice), " has no usable ", missing, ": its position is unknown"));
     }
-    TF_RETURN_IF_ERROR(CheckRescale(slice, any_states, has_offset));
+    TF_RETURN_IF_ERROR(CheckRescale(slice, any_states, may_lack_rescale));
   }
   return absl::OkStatus();
 }
@@ -255,9 +256,9 @@ absl::Status CheckStep(const Eigen::Vector3d& step, const Eigen::Vector3d& norma
 
 }  // namespace
 
-absl::Status ArrangeStack(bool has_offset, DicomStack* stack) {
+absl::Status ArrangeStack(bool may_lack_rescale, DicomStack* stack) {
   std::vector<DicomHeader>& slices = stack->slices;
-  TF_RETURN_IF_ERROR(CheckTags(slices, has_offset));
+  TF_RETURN_IF_ERROR(CheckTags(slices, may_lack_rescale));
   TF_RETURN_IF_ERROR(CheckAlike(slices));
   NoteRescale(stack);
   TF_RETURN_IF_ERROR(CheckPlane(slices.front()));

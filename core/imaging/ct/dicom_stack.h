@@ -29,8 +29,8 @@ struct DicomStack {
 //
 // Errors: InvalidArgument, naming the slice, when a tag is missing; when slices differ in size,
 // orientation or pixel spacing; when there are too few, or two at one place; when a gap,
-// the spacing or the tilt is absurd. `has_offset` says that the recipe states how values become HU,
-// so that rescale tags may be missing.
-absl::Status ArrangeStack(bool has_offset, DicomStack* stack);
+// the spacing or the tilt is absurd. `may_lack_rescale` says that the recipe states what the values
+// are, so that rescale tags may be missing.
+absl::Status ArrangeStack(bool may_lack_rescale, DicomStack* stack);
 
 }  // namespace tissueform

@@ -25,16 +25,20 @@
 namespace tissueform {
 namespace {
 
+// Whether a series without RescaleIntercept is one that the user means.
+bool MayLackRescale(const CtReadOptions& options) {
+  return options.hu_offset.has_value() || options.values == CtValues::kGray;
+}
+
 absl::StatusOr<SeriesChoice> ChoiceOf(const std::string& path, const DicomFolder& folder,
                                       const CtReadOptions& options) {
   if (std::filesystem::is_directory(path)) {
-    return SeriesChoice{0, options.series_number, options.join_series,
-                        options.hu_offset.has_value()};
+    return SeriesChoice{0, options.series_number, options.join_series, MayLackRescale(options)};
   }
   for (const DicomHeader& file : folder.files) {
     if (file.path != path) continue;
     return SeriesChoice{file.file_number, std::nullopt, options.join_series,
-                        options.hu_offset.has_value()};
+                        MayLackRescale(options)};
   }
   return absl::InvalidArgumentError(
       "the file is not a DICOM file, and its ending is not .nii .nii.gz .nrrd .nhdr .mha or .mhd");
@@ -146,7 +150,8 @@ absl::StatusOr<DicomStack> FindStack(const std::string& path, const CtReadOption
   const int copies = DropCopies(options.limits.max_file_bytes, &folder.files);
   absl::StatusOr<DicomStack> stack = ChooseSeries(folder.files, choice);
   if (!stack.ok()) return WithSearch(stack.status(), folder, max_depth);
-  const absl::Status arranged = ArrangeStack(options.hu_offset.has_value(), &*stack);
+  const absl::Status arranged =
+      ArrangeStack(options.hu_offset.has_value() || options.values != CtValues::kHu, &*stack);
   if (!arranged.ok() && options.join_series == JoinSeries::kAlways) {
     return absl::Status(arranged.code(),
                         absl::StrCat(arranged.message(),
@@ -190,7 +195,7 @@ void TakeSlice(const DicomHeader& slice, const float* image, size_t k, double of
   const double intercept = slice.rescale_intercept.value_or(0) + offset;
   const size_t count = static_cast<size_t>(slice.rows) * static_cast<size_t>(slice.columns);
   for (size_t i = 0; i < count; ++i) {
-    volume->hu[k * count + i] = ToHu(slope * static_cast<double>(image[i]) + intercept);
+    volume->hu[k * count + i] = ToStored(slope * static_cast<double>(image[i]) + intercept);
   }
 }
 
@@ -251,6 +256,7 @@ absl::StatusOr<CtVolume> ReadDicomVolume(const std::string& path, const CtReadOp
         ") that does not result in HU: \"hu_offset\" of the recipe is added"));
   }
   TF_RETURN_IF_ERROR(ReadSlices(stack, options.hu_offset.value_or(0), max_bytes, &volume));
+  TF_RETURN_IF_ERROR(SettleValues(options, StatesRescale(stack), &volume));
   return volume;
 }
 

@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 
 #include "core/base/lfs_pointer.h"
 
@@ -18,16 +19,20 @@ namespace {
 
 constexpr size_t kChunk = size_t{1} << 20;
 constexpr int kGzipOrZlib = 15 + 32;  // window bits, and zlib's "detect which"
+constexpr int kBareDeflate = -15;     // without a header
 
 class Inflater {
  public:
-  Inflater() : buffer_(kChunk) { ready_ = inflateInit2(&stream_, kGzipOrZlib) == Z_OK; }
+  explicit Inflater(int format) : buffer_(kChunk) {
+    ready_ = inflateInit2(&stream_, format) == Z_OK;
+  }
   ~Inflater() { inflateEnd(&stream_); }
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
   // Size of the first stream, which it takes from `packed`; -1 when it does not end as it should.
-  int64_t TakeStream(int64_t enough, absl::string_view* packed) {
+  // Appends what it holds to `unpacked`, unless that is null.
+  int64_t TakeStream(int64_t enough, absl::string_view* packed, std::string* unpacked) {
     int64_t count = 0;
     int result = ready_ ? inflateReset(&stream_) : Z_MEM_ERROR;
     while (result == Z_OK && count <= enough) {
@@ -39,15 +44,23 @@ class Inflater {
       stream_.avail_out = static_cast<uInt>(buffer_.size());
       result = inflate(&stream_, Z_NO_FLUSH);
       packed->remove_prefix(given - stream_.avail_in);
-      count += static_cast<int64_t>(buffer_.size() - stream_.avail_out);
+      const size_t made = buffer_.size() - stream_.avail_out;
+      count += static_cast<int64_t>(made);
+      if (unpacked != nullptr)
+        unpacked->append(reinterpret_cast<const char*>(buffer_.data()), made);
     }
+    is_ended_ = result == Z_STREAM_END;
     return result == Z_OK || result == Z_STREAM_END ? count : -1;
   }
+
+  // Whether the last stream was whole.
+  bool is_ended() const { return is_ended_; }
 
  private:
   z_stream stream_{};
   std::vector<Bytef> buffer_;
   bool ready_ = false;
+  bool is_ended_ = false;
 };
 
 }  // namespace
@@ -76,10 +89,10 @@ absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* byte
 // unpack to as many gigabytes as whoever packed them liked.
 int64_t UnpackedSize(absl::string_view packed, int64_t enough) {
   enough += static_cast<int64_t>(kChunk);
-  Inflater inflater;
+  Inflater inflater(kGzipOrZlib);
   int64_t count = 0;
   do {
-    const int64_t stream_bytes = inflater.TakeStream(enough - count, &packed);
+    const int64_t stream_bytes = inflater.TakeStream(enough - count, &packed, nullptr);
     if (stream_bytes < 0) return 0;
     count += stream_bytes;
   } while (count <= enough && IsGzip(packed));
@@ -103,6 +116,20 @@ std::string UnpackedStart(absl::string_view contents, size_t count) {
   const bool is_usable = result == Z_OK || result == Z_STREAM_END || result == Z_BUF_ERROR;
   start.resize(is_usable ? count - stream.avail_out : 0);
   return start;
+}
+
+absl::StatusOr<std::string> Inflated(absl::string_view packed, int64_t max_bytes) {
+  Inflater inflater(kBareDeflate);
+  std::string unpacked;
+  const int64_t count = inflater.TakeStream(max_bytes, &packed, &unpacked);
+  if (count > max_bytes) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("it unpacks to more than ", max_bytes, " bytes"));
+  }
+  if (count < 0 || !inflater.is_ended()) {
+    return absl::InvalidArgumentError("its compressed part is cut off or damaged");
+  }
+  return unpacked;
 }
 
 bool IsLfsPointerFile(const std::string& path) {

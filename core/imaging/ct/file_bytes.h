@@ -23,6 +23,10 @@ int64_t UnpackedSize(absl::string_view packed, int64_t enough);
 // The first bytes of `contents`, unpacked where they are gzip; fewer if there are not so many.
 std::string UnpackedStart(absl::string_view contents, size_t count);
 
+// Unpacks one stream of bare deflate (RFC 1951); what follows its end does not count. Errors:
+// InvalidArgument where it is cut off or damaged, ResourceExhausted beyond `max_bytes`.
+absl::StatusOr<std::string> Inflated(absl::string_view packed, int64_t max_bytes);
+
 // Whether the file is a git-LFS pointer (core/base/lfs_pointer.h).
 bool IsLfsPointerFile(const std::string& path);
 

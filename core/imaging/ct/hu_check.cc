@@ -9,6 +9,8 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "core/imaging/ct/cylinder_field.h"
+
 namespace tissueform {
 namespace {
 
@@ -54,15 +56,24 @@ int MostFrequent(const HuHistogram& histogram, int low, int high) {
 // Stored values of most scanners are HU + 1024: air near 0, soft tissue (HU 0 to 100, the most
 // frequent matter) near 1050. Then the message can give the offset; it is not applied by itself,
 // because a guess of a unit must be the user's.
-absl::Status WithoutAir(const HuHistogram& histogram, std::optional<double> hu_offset) {
+std::optional<int> TissueOfRawValues(const HuHistogram& histogram) {
   constexpr int kLeastTissueMode = 900;
   constexpr int kMaxTissueMode = 1200;
+  constexpr int kMaxAirMode = 120;
   const int mode = MostFrequent(histogram, 500, 2000);
-  const bool air_at_zero = ShareBetween(histogram, -100, 300) > kLeastShare;
-  if (!hu_offset && air_at_zero && mode >= kLeastTissueMode && mode <= kMaxTissueMode) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the values are not HU: air lies near 0 and soft tissue near ", mode,
-                     ", which looks like HU + 1024; add \"hu_offset\": -1024 to the recipe"));
+  const bool has_air = ShareBetween(histogram, -100, 300) > kLeastShare;
+  const int air = MostFrequent(histogram, -500, 500);
+  if (has_air && std::abs(air) <= kMaxAirMode && mode >= kLeastTissueMode && mode <= kMaxTissueMode)
+    return mode;
+  return std::nullopt;
+}
+
+absl::Status WithoutAir(const HuHistogram& histogram, std::optional<double> hu_offset) {
+  if (const std::optional<int> mode = TissueOfRawValues(histogram); mode && !hu_offset) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the values are not HU: air lies near 0 and soft tissue near ", *mode,
+        ", which looks like HU + 1024; add \"hu_offset\": -1024 to the recipe, or for a cone-beam "
+        "CT \"values\": \"gray\""));
   }
   return absl::InvalidArgumentError(absl::StrCat(
       "the values are not HU of a body in air: almost none is below ", kAirBelow,
@@ -80,14 +91,19 @@ bool HidesRawValues(const HuHistogram& histogram) {
          tissue > 3 * ShareBetween(histogram, 350, 750);
 }
 
-}  // namespace
-
-int16_t ToHu(double value) {
-  return static_cast<int16_t>(std::lround(std::clamp(value, double{kLowest}, double{kHighest})));
+// Of what the scanner has seen: around a cone-beam scanner's cylinder any value may be.
+HuHistogram CountInField(const CtVolume& volume) {
+  const std::optional<CylinderField> field = FindCylinderField(volume);
+  if (!field) return Count(volume.hu);
+  HuHistogram histogram{};
+  const std::vector<uint8_t> section = CrossSectionOf(*field, volume);
+  ForEachVoxelOfSection(*field, volume, [&](size_t index, size_t at) {
+    if (section[at] != 0) ++histogram[BinOf(volume.hu[index])];
+  });
+  return histogram;
 }
 
-absl::Status CheckHu(const std::vector<int16_t>& hu, std::optional<double> hu_offset) {
-  const HuHistogram histogram = Count(hu);
+absl::Status CheckHistogram(const HuHistogram& histogram, std::optional<double> hu_offset) {
   if (ShareBetween(histogram, kLowest, kAirBelow) < kLeastShare || HidesRawValues(histogram)) {
     return WithoutAir(histogram, hu_offset);
   }
@@ -99,6 +115,38 @@ absl::Status CheckHu(const std::vector<int16_t>& hu, std::optional<double> hu_of
                                : "; if an offset was applied twice, state \"hu_offset\" in the "
                                  "recipe to undo one"));
   }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+int16_t ToStored(double value) {
+  return static_cast<int16_t>(std::lround(std::clamp(value, -32768.0, double{kHighest})));
+}
+
+absl::Status CheckHu(const std::vector<int16_t>& hu, std::optional<double> hu_offset) {
+  return CheckHistogram(Count(hu), hu_offset);
+}
+
+absl::Status SettleValues(const CtReadOptions& options, bool states_rescale, CtVolume* volume) {
+  volume->has_gray_values = options.values == CtValues::kGray;
+  if (volume->has_gray_values) return absl::OkStatus();
+  const HuHistogram histogram = CountInField(*volume);
+  const absl::Status are_hu = CheckHistogram(histogram, options.hu_offset);
+  const bool may_be_gray = options.values == CtValues::kAuto && !options.hu_offset &&
+                           ShareBetween(histogram, kMatterFrom, kHighest) >= kLeastShare &&
+                           !TissueOfRawValues(histogram);
+  if (!are_hu.ok() && may_be_gray) {
+    volume->has_gray_values = true;
+    return absl::OkStatus();
+  }
+  if (!are_hu.ok()) return are_hu;
+  if (!states_rescale && !options.hu_offset) {
+    volume->provenance.notes.emplace_back(
+        "the files have no RescaleIntercept; their values are taken as HU, as they are those of a "
+        "body in air");
+  }
+  for (int16_t& hu : volume->hu) hu = std::max(hu, int16_t{kLowest});
   return absl::OkStatus();
 }
 

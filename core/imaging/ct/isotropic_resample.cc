@@ -13,6 +13,7 @@
 
 #include "core/base/parallel_for.h"
 #include "core/imaging/ct/uneven_slices.h"
+#include "core/imaging/ct/upright_resample.h"
 
 namespace tissueform {
 namespace {
@@ -86,28 +87,41 @@ bool LiesInVolume(const Eigen::Vector3d& place, const std::array<int, 3>& size) 
   return true;
 }
 
+SamplePlaces PlacesOf(const CtVolume& volume, const GridGeometry& grid) {
+  const Eigen::Matrix3d to_index = ToIndex(volume);
+  return {.start = to_index * (grid.origin_mm - volume.origin_mm),
+          .steps = to_index * grid.spacing_mm,
+          .size = grid.size,
+          .samples = SamplesPerVoxel(to_index, grid.spacing_mm),
+          .rounding = kRounding,
+          .beyond = kAir};
+}
+
+// Samples each place by itself, as volumes need that are turned, sheared or of uneven slices.
 class Sampler {
  public:
   Sampler(const CtVolume& volume, const GridGeometry& grid)
-      : volume_(volume),
-        grid_(grid),
-        to_index_(ToIndex(volume)),
-        start_(to_index_ * (grid.origin_mm - volume.origin_mm)),
-        steps_(to_index_ * grid.spacing_mm),
-        samples_(SamplesPerVoxel(to_index_, grid.spacing_mm)) {
+      : volume_(volume), grid_(grid), places_(PlacesOf(volume, grid)) {
     if (!volume.slice_origins_mm.empty()) uneven_.emplace(volume);
   }
 
-  // Mean over voxel (x, y, z) of the grid, of the samples that lie in the volume.
+  void FillSlice(int z, int16_t* values) const {
+    for (int y = 0; y < grid_.size[1]; ++y) {
+      for (int x = 0; x < grid_.size[0]; ++x) *values++ = Mean(x, y, z);
+    }
+  }
+
+  // Over voxel (x, y, z) of the grid, of the samples that lie in the volume.
   int16_t Mean(int x, int y, int z) const {
     double sum = 0;
     int count = 0;
-    for (int c = 0; c < samples_[2]; ++c) {
-      for (int b = 0; b < samples_[1]; ++b) {
-        for (int a = 0; a < samples_[0]; ++a) {
-          const Eigen::Vector3d place(x + Offset(a, 0), y + Offset(b, 1), z + Offset(c, 2));
-          const bool inside =
-              uneven_ ? AddUnevenSample(place, &sum) : AddSample(start_ + steps_ * place, &sum);
+    for (int c = 0; c < places_.samples[2]; ++c) {
+      for (int b = 0; b < places_.samples[1]; ++b) {
+        for (int a = 0; a < places_.samples[0]; ++a) {
+          const Eigen::Vector3d place(x + places_.Offset(a, 0), y + places_.Offset(b, 1),
+                                      z + places_.Offset(c, 2));
+          const bool inside = uneven_ ? AddUnevenSample(place, &sum)
+                                      : AddSample(places_.start + places_.steps * place, &sum);
           count += inside ? 1 : 0;
         }
       }
@@ -116,8 +130,6 @@ class Sampler {
   }
 
  private:
-  double Offset(int sample, size_t axis) const { return (sample + 0.5) / samples_[axis] - 0.5; }
-
   bool AddSample(const Eigen::Vector3d& index, double* sum) const {
     if (!LiesInVolume(index, volume_.size)) return false;
     *sum += VoxelCell(index, volume_.size).Mean([this](int i, int j, int k) {
@@ -136,11 +148,8 @@ class Sampler {
 
   const CtVolume& volume_;
   const GridGeometry& grid_;
+  SamplePlaces places_;
   std::optional<UnevenSlices> uneven_;
-  Eigen::Matrix3d to_index_;
-  Eigen::Vector3d start_;  // place of the grid's first voxel in the volume
-  Eigen::Matrix3d steps_;  // from one voxel of the grid to the next, in voxels of the volume
-  Samples samples_;
 };
 
 absl::Status CheckRequest(const Eigen::AlignedBox3d& box, double spacing_mm, int64_t max_bytes) {
@@ -167,16 +176,21 @@ absl::StatusOr<HuGrid> ResampleIsotropic(const CtVolume& volume, double spacing_
   if (!possible.ok()) return possible;
   HuGrid grid(GridOver(box, spacing_mm));
   const Sampler sampler(volume, grid.geometry);
-  const auto [size_x, size_y, size_z] = grid.geometry.size;
-  const auto fill = [&grid, &sampler, size_x = size_x, size_y = size_y](Eigen::Index begin,
-                                                                        Eigen::Index end) {
-    for (int z = static_cast<int>(begin); z < end; ++z) {
-      for (int y = 0; y < size_y; ++y) {
-        for (int x = 0; x < size_x; ++x) grid.At(x, y, z) = sampler.Mean(x, y, z);
+  const std::optional<UprightResampler> upright =
+      UprightResampler::Create(volume, PlacesOf(volume, grid.geometry));
+  const auto mean = [&sampler](int x, int y, int z) { return sampler.Mean(x, y, z); };
+  const Eigen::Index slice = Eigen::Index{grid.geometry.size[0]} * grid.geometry.size[1];
+  const auto fill = [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index z = begin; z < end; ++z) {
+      int16_t* const values = grid.values.data() + z * slice;
+      if (upright) {
+        upright->FillSlice(static_cast<int>(z), mean, values);
+      } else {
+        sampler.FillSlice(static_cast<int>(z), values);
       }
     }
   };
-  ParallelFor(options.threads, size_z, 1, fill);
+  ParallelFor(options.threads, grid.geometry.size[2], 1, fill);
   return grid;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/parallel_for.h"
+#include "core/imaging/ct/cylinder_field.h"
 #include "core/imaging/ct/isotropic_resample.h"
 
 namespace tissueform {
@@ -252,6 +253,24 @@ class StreakFilter {
   std::vector<bool> has_streaks_;
 };
 
+// Whether tissue ends on it: a voxel of tissue lies within the rim that the field leaves out.
+bool AddOutsideOf(const CylinderField& field, const CtVolume& volume,
+                  std::vector<uint8_t>* unscanned) {
+  CylinderField inner = field;
+  inner.radius_mm -= 2 * volume.spacing_mm.maxCoeff();
+  const std::vector<uint8_t> well_inside = CrossSectionOf(inner, volume);
+  const std::vector<uint8_t> section = CrossSectionOf(field, volume);
+  bool cuts = false;
+  ForEachVoxelOfSection(field, volume, [&](size_t index, size_t at) {
+    if (section[at] == 0) {
+      (*unscanned)[index] = 1;
+    } else if (well_inside[at] == 0 && volume.hu[index] > kTissueHu) {
+      cuts = true;
+    }
+  });
+  return cuts;
+}
+
 bool IsUpright(const CtVolume& volume) {
   const auto is_whole = [](double part) { return std::abs(part - std::round(part)) < kAskew; };
   return volume.slice_origins_mm.empty() &&
@@ -280,7 +299,9 @@ std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads,
       if (filter.Run(k)) cuts_tissue[k] = slice.TouchesTissue() ? 1 : 0;
     });
   }
-  if (std::find(cuts_tissue.begin(), cuts_tissue.end(), 1) == cuts_tissue.end()) unscanned.clear();
+  const bool field_cuts = volume.field && AddOutsideOf(*volume.field, volume, &unscanned);
+  if (!field_cuts && std::find(cuts_tissue.begin(), cuts_tissue.end(), 1) == cuts_tissue.end())
+    unscanned.clear();
   return unscanned;
 }
 

@@ -263,7 +263,7 @@ absl::StatusOr<CtVolume> TakeHu(VolumeFileValues file, double offset) {
       return absl::InvalidArgumentError(
           absl::StrCat("voxel ", i, " is not a number; replace such voxels by air"));
     }
-    volume.hu[i] = ToHu(file.values[i] + offset);
+    volume.hu[i] = ToStored(file.values[i] + offset);
   }
   return volume;
 }
@@ -335,7 +335,8 @@ absl::StatusOr<CtVolume> ReadVolumeFile(const std::string& path, VolumeFormat fo
                                           [&](VolumeFileValues file) {
                                             volume = TakeHu(std::move(file),
                                                             options.hu_offset.value_or(0));
-                                            return volume.status();
+                                            if (!volume.ok()) return volume.status();
+                                            return SettleValues(options, true, &*volume);
                                           }));
   return volume;
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <gdcmReader.h>
 #include <map>
@@ -15,6 +16,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "absl/strings/string_view.h"
 #include <Eigen/LU>
 
@@ -43,6 +45,7 @@ constexpr uint32_t kSegmentNumber = 0x00620004;
 constexpr uint32_t kSegmentLabel = 0x00620005;
 constexpr uint32_t kMaxFraction = 0x0062000e;
 constexpr uint32_t kPropertyType = 0x0062000f;
+constexpr absl::string_view kDeflatedSyntax = "1.2.840.10008.1.2.1.99";
 constexpr absl::string_view kSegClass = "1.2.840.10008.5.1.4.1.1.66.4";
 constexpr absl::string_view kLabelMapClass = "1.2.840.10008.5.1.4.1.1.66.7";
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
@@ -96,6 +99,16 @@ absl::StatusOr<std::vector<float>> StoredValues(absl::string_view bytes, size_t 
   return values;
 }
 
+// The file as one of the SEG class: GDCM decodes no pixels of the newer class of label maps. Both
+// UIDs have the same length.
+std::string AsSegClass(const SegFile& file) {
+  static_assert(kSegClass.size() == kLabelMapClass.size());
+  const absl::string_view contents = file.contents;
+  return absl::StrCat(
+      absl::StrReplaceAll(contents.substr(0, file.pixel_offset), {{kLabelMapClass, kSegClass}}),
+      contents.substr(file.pixel_offset));
+}
+
 absl::StatusOr<std::vector<float>> ValuesOf(const SegFile& file, const SegGrid& grid, size_t count,
                                             int bits) {
   if (!file.compressed) {
@@ -106,7 +119,7 @@ absl::StatusOr<std::vector<float>> ValuesOf(const SegFile& file, const SegGrid& 
   header.columns = grid.size[0];
   header.num_frames = static_cast<int>(grid.frames.size());
   header.pixel_offset = file.pixel_offset;
-  absl::StatusOr<std::vector<float>> values = DecodeDicomPixels(header, file.contents);
+  absl::StatusOr<std::vector<float>> values = DecodeDicomPixels(header, AsSegClass(file));
   return values.ok() ? std::move(values) : Compressed();
 }
 
@@ -245,9 +258,38 @@ bool IsDicomFile(const std::string& path) {
   return stream.good() && start.substr(kPreamble) == "DICM";
 }
 
+namespace {
+
+// The same file with its data set unpacked, where that is deflated (as dcmqi's files may be). GDCM
+// does not tell where the pixels of such a file begin.
+absl::StatusOr<std::string> WithoutDeflate(std::string contents, int64_t max_bytes) {
+  constexpr absl::string_view kGroupLength("\x02\0\0\0UL\4\0", 8);  // (0002,0000), 4 bytes
+  constexpr size_t kBegin = 132;
+  constexpr absl::string_view kPlain(
+      "\x02\0\0\0UL\4\0\x1c\0\0\0\x02\0\x10\0UI\x14\0"
+      "1.2.840.10008.1.2.1\0",
+      40);
+  const absl::string_view meta = absl::string_view(contents).substr(kBegin);
+  if (!absl::StartsWith(meta, kGroupLength)) return contents;
+  uint32_t length = 0;
+  const size_t begin = kGroupLength.size() + sizeof(length);
+  if (meta.size() < begin) return Damaged();
+  std::memcpy(&length, meta.data() + kGroupLength.size(), sizeof(length));
+  const size_t end = begin + length;
+  if (meta.size() < end) return Damaged();
+  if (!absl::StrContains(meta.substr(0, end), kDeflatedSyntax)) return contents;
+  TF_ASSIGN_OR_RETURN(const std::string unpacked, Inflated(meta.substr(end), max_bytes));
+  return absl::StrCat(absl::string_view(contents).substr(0, kBegin), kPlain, unpacked);
+}
+
+}  // namespace
+
 absl::StatusOr<LabelMap> ReadDicomSeg(const std::string& path, const LabelReadOptions& options) {
   int64_t bytes_left = options.limits.max_file_bytes;
-  TF_ASSIGN_OR_RETURN(const std::string contents, ReadWholeFile(path, &bytes_left));
+  TF_ASSIGN_OR_RETURN(std::string file, ReadWholeFile(path, &bytes_left));
+  const std::string sha256 = Sha256Hex({file});
+  TF_ASSIGN_OR_RETURN(const std::string contents,
+                      WithoutDeflate(std::move(file), options.limits.max_file_bytes));
   std::istringstream stream(contents);
   gdcm::Reader reader;
   reader.SetStream(stream);
@@ -265,7 +307,7 @@ absl::StatusOr<LabelMap> ReadDicomSeg(const std::string& path, const LabelReadOp
   if (pixel_offset > contents.size()) return Damaged();
   TF_ASSIGN_OR_RETURN(LabelMap map,
                       ToLabelMap({data, contents, pixel_offset, syntax.IsEncapsulated()}, options));
-  map.sha256 = Sha256Hex({contents});
+  map.sha256 = sha256;
   return map;
 }
 

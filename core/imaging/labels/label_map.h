@@ -64,8 +64,9 @@ struct LabelMap {
   Eigen::Matrix3d steps_mm = Eigen::Matrix3d::Identity();  // columns: from one voxel to the next
   std::vector<StructureSet> structures;                    // i fastest
 
-  std::string format;  // "NRRD", "NIfTI", "MetaImage", "DICOM SEG"
-  std::string sha256;  // of the file; of a header with data files as CtProvenance::sha256
+  std::string format;  // "NRRD", "NIfTI", "MetaImage", "DICOM SEG"; "..., a file a structure"
+  std::string sha256;  // of the file; of a header with data files as CtProvenance::sha256; of a
+                       // folder that of names and digests of the masks that were read
   std::vector<LabelSegment> segments;
   std::vector<std::string> notes;  // what a reader of the report should know, one sentence each
 
@@ -75,10 +76,10 @@ struct LabelMap {
   int64_t num_voxels() const { return int64_t{size[0]} * size[1] * size[2]; }
 };
 
-// Reads a label map: NRRD and .seg.nrrd, NIfTI, MetaImage, or a file of DICOM SEG (binary,
-// fractional, label map). What a segment is follows from, in this order: `names`, its name in the
-// file, its code, `convention` or the convention that its number fits. Runs in a helper program
-// within the limits. Any thread may call it.
+// Reads a label map: NRRD and .seg.nrrd, NIfTI, MetaImage, a file of DICOM SEG (binary, fractional,
+// label map), or a folder of masks (label_folder_reader.h). What a segment is follows from, in this
+// order: `names`, its name in the file, its code, `convention` or the convention that its number
+// fits. Runs in a helper program within the limits. Any thread may call it.
 //
 // Errors: NotFound when there is no such file; ResourceExhausted beyond a limit; InvalidArgument
 // for what is not a label map: values that are not whole numbers from 0 to 65535, no labelled

@@ -146,8 +146,10 @@ absl::StatusOr<LabelMap> ReceiveMap(int descriptor, const LabelLimits& limits) {
 absl::Status CheckFile(const std::string& path, const LabelLimits& limits) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return absl::NotFoundError("there is no such file");
+  if (std::filesystem::is_directory(path, error)) return absl::OkStatus();  // its files are checked
   if (!std::filesystem::is_regular_file(path, error)) {
-    return absl::InvalidArgumentError("it is not a file; name the file of the label map");
+    return absl::InvalidArgumentError(
+        "it is not a file; name the file of the label map, or a folder of masks");
   }
   const auto bytes = static_cast<int64_t>(std::filesystem::file_size(path, error));
   if (error || bytes <= limits.max_file_bytes) return absl::OkStatus();

@@ -10,6 +10,7 @@
 #include "core/imaging/ct/file_bytes.h"
 #include "core/imaging/ct/volume_header.h"
 #include "core/imaging/labels/dicom_seg_reader.h"
+#include "core/imaging/labels/label_folder_reader.h"
 #include "core/imaging/labels/label_reader_call.h"
 #include "core/imaging/labels/label_volume_reader.h"
 
@@ -18,6 +19,7 @@ namespace {
 
 absl::StatusOr<LabelMap> Read(const std::string& given_path, const LabelReadOptions& options) {
   const std::string path = std::filesystem::absolute(given_path).lexically_normal().string();
+  if (std::filesystem::is_directory(path)) return ReadLabelFolder(path, options);
   if (IsLfsPointerFile(path)) return absl::InvalidArgumentError(kLfsPointerMessage);
   if (IsDicomFile(path)) return ReadDicomSeg(path, options);
   if (const std::optional<VolumeFormat> format = VolumeFormatOfPath(path)) {

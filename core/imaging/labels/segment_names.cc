@@ -49,19 +49,6 @@ std::string NameOf(const LabelSegment& segment) {
   return absl::StrCat(segment.value, " (", segment.name, ")");
 }
 
-std::string NamesOf(const std::vector<const LabelSegment*>& segments) {
-  std::vector<std::string> names;
-  for (const LabelSegment* segment : segments) {
-    if (names.size() == kMaxNamesInMessage) break;
-    names.push_back(NameOf(*segment));
-  }
-  std::string text = absl::StrJoin(names, ", ");
-  if (segments.size() > names.size()) {
-    absl::StrAppend(&text, " and ", segments.size() - names.size(), " more");
-  }
-  return text;
-}
-
 bool SameName(absl::string_view a, absl::string_view b) {
   return absl::AsciiStrToLower(absl::StripAsciiWhitespace(a)) ==
          absl::AsciiStrToLower(absl::StripAsciiWhitespace(b));
@@ -219,6 +206,25 @@ absl::Status CheckKnown(const std::vector<LabelSegment>& segments) {
 }
 
 }  // namespace
+
+bool IsKnownName(const LabelReadOptions& options, absl::string_view name) {
+  return StructureOfName(name).has_value() ||
+         std::ranges::any_of(options.names,
+                             [&](const LabelRule& rule) { return SameName(rule.name, name); });
+}
+
+std::string NamesOf(const std::vector<const LabelSegment*>& segments) {
+  std::vector<std::string> names;
+  for (const LabelSegment* segment : segments) {
+    if (names.size() == kMaxNamesInMessage) break;
+    names.push_back(NameOf(*segment));
+  }
+  std::string text = absl::StrJoin(names, ", ");
+  if (segments.size() > names.size()) {
+    absl::StrAppend(&text, " and ", segments.size() - names.size(), " more");
+  }
+  return text;
+}
 
 std::string PrintableName(absl::string_view name) {
   std::string printable;

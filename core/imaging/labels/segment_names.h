@@ -27,6 +27,12 @@ struct SegmentFacts {
 // The first 40 characters without what is not printable, for messages and reports.
 std::string PrintableName(absl::string_view name);
 
+// Whether a segment of that name has a structure: by `options.names`, or by its name.
+bool IsKnownName(const LabelReadOptions& options, absl::string_view name);
+
+// "3 (lower jaw), 4 (b) and 17 more".
+std::string NamesOf(const std::vector<const LabelSegment*>& segments);
+
 // Sets `structure` and `side` of each segment from its facts by the order that ReadLabelMap states.
 // `facts` are those of the segments, one each. `voxel_mm3` is the volume of a voxel. Appends what
 // was assumed and ignored to `notes`.

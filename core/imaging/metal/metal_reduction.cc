@@ -13,6 +13,7 @@
 #include "core/base/status_macros.h"
 #include "core/imaging/ct/isotropic_resample.h"
 #include "core/imaging/ct/unscanned.h"
+#include "core/imaging/metal/carried_skin.h"
 #include "core/imaging/metal/parallel_beam.h"
 #include "core/imaging/metal/slice_correction.h"
 #include "core/imaging/metal/slice_stack.h"
@@ -190,11 +191,11 @@ MetalReport ReduceMetalArtifacts(const MetalFindings& findings, int threads, CtV
   return report;
 }
 
-absl::StatusOr<LabelGrid> ResampleMetal(const MetalFindings& findings, CtVolume volume,
-                                        double spacing_mm, int threads) {
-  // The mean over a voxel of the grid is the share of it that is metal.
+absl::StatusOr<LabelGrid> ResampleMask(const std::vector<uint8_t>& mask, CtVolume volume,
+                                       double spacing_mm, int threads) {
+  // The mean over a voxel of the grid is the share of it that is in the mask.
   for (size_t i = 0; i < volume.hu.size(); ++i) {
-    volume.hu[i] = findings.mask[i] != 0 ? kWholly : int16_t{0};
+    volume.hu[i] = mask[i] != 0 ? kWholly : int16_t{0};
   }
   TF_ASSIGN_OR_RETURN(const HuGrid share,
                       ResampleIsotropic(volume, spacing_mm, {.threads = threads}));
@@ -209,18 +210,25 @@ absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spaci
                                                    const MetalOptions& options, int threads) {
   CtWithMetal ct;
   MetalFindings findings;
+  CarriedSkin carried;
   if (options.correct) findings = FindMetal(volume, options.threshold_hu);
   const ResampleOptions resample = {.threads = threads};
   TF_ASSIGN_OR_RETURN(ct.unscanned, ResampleUnscanned(volume, spacing_mm, threads, findings.mask));
   if (findings.any()) {
     TF_ASSIGN_OR_RETURN(ct.before, ResampleIsotropic(volume, spacing_mm, resample));
     ct.report = ReduceMetalArtifacts(findings, threads, &volume);
+    carried = CarrySkinOver(findings, threads, &volume);
     ct.before = SlicesBetween(ct.before, ct.report.low_z_mm - kShownBesideMm,
                               ct.report.high_z_mm + kShownBesideMm);
   }
   TF_ASSIGN_OR_RETURN(ct.hu, ResampleIsotropic(volume, spacing_mm, resample));
+  if (!carried.mask.empty()) {
+    ct.report.carried = {carried.slices, carried.filled_mm3, carried.removed_mm3};
+    TF_ASSIGN_OR_RETURN(ct.carried_skin, ResampleMask(carried.mask, volume, spacing_mm, threads));
+  }
   if (findings.any()) {
-    TF_ASSIGN_OR_RETURN(ct.metal, ResampleMetal(findings, std::move(volume), spacing_mm, threads));
+    TF_ASSIGN_OR_RETURN(ct.metal,
+                        ResampleMask(findings.mask, std::move(volume), spacing_mm, threads));
   }
   return ct;
 }

@@ -29,6 +29,14 @@ struct MetalReport {
   double low_z_mm = 0;       // of the metal, patient coordinates
   double high_z_mm = 0;
 
+  // Where the skin was carried over from clean slices (core/imaging/metal/carried_skin.h).
+  struct Carried {
+    int slices = 0;
+    double filled_mm3 = 0;
+    double removed_mm3 = 0;
+  };
+  Carried carried;
+
   bool any() const { return !clusters.empty(); }
 };
 
@@ -45,6 +53,9 @@ struct CtWithMetal {
   HuGrid hu;
   // 1 where a quarter of the voxel or more is metal; without voxels where there is no metal.
   LabelGrid metal;
+  // 1 where a quarter of the voxel or more was changed to carry the skin over; without voxels where
+  // nothing was.
+  LabelGrid carried_skin;
   // What `hu` was before, from 5 mm under to 5 mm over the metal; without voxels where there is
   // none.
   HuGrid before;
@@ -53,14 +64,14 @@ struct CtWithMetal {
   MetalReport report;
 };
 
-// 1 where a quarter of the voxel or more is metal, on the grid that ResampleIsotropic makes of
-// `volume`, in which the metal was found. Its values are overwritten. Errors: those of
+// 1 where a quarter of the voxel or more is in the mask (as CtVolume::hu), on the grid that
+// ResampleIsotropic makes of `volume`, whose values are overwritten. Errors: those of
 // ResampleIsotropic.
-absl::StatusOr<LabelGrid> ResampleMetal(const MetalFindings& findings, CtVolume volume,
-                                        double spacing_mm, int threads);
+absl::StatusOr<LabelGrid> ResampleMask(const std::vector<uint8_t>& mask, CtVolume volume,
+                                       double spacing_mm, int threads);
 
-// ResampleIsotropic of the volume without streaks; of the volume itself where options.correct is
-// false or no metal is found. Errors: those of ResampleIsotropic.
+// ResampleIsotropic of the volume without streaks, its skin carried over; of the volume itself
+// where options.correct is false or no metal is found. Errors: those of ResampleIsotropic.
 absl::StatusOr<CtWithMetal> ResampleWithoutStreaks(CtVolume volume, double spacing_mm,
                                                    const MetalOptions& options, int threads);
 

@@ -41,6 +41,7 @@ SeriesRule RuleOf(const RulesJson& json, const std::string& folder) {
   rule.name = json.value("name", rule.name);
   const std::filesystem::path recipe(json.at("recipe").get<std::string>());
   rule.recipe = (recipe.is_absolute() ? recipe : std::filesystem::path(folder) / recipe).string();
+  rule.draft = json.value("draft", rule.draft);
   rule.modality = json.value("modality", rule.modality);
   rule.axial_only = json.value("axial_only", rule.axial_only);
   rule.min_slices = json.value("min_slices", rule.min_slices);

@@ -21,6 +21,7 @@ enum class SeriesPreference { kSoftKernel, kBoneKernel, kThinSlices, kNoContrast
 struct SeriesRule {
   std::string name = {};
   std::string recipe = {};  // file
+  bool draft = false;       // whether a person plans in the browser, beginning with the recipe
   std::string modality = "CT";
   bool axial_only = true;
   int min_slices = 60;

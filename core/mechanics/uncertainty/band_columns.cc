@@ -32,11 +32,11 @@ absl::StatusOr<std::unique_ptr<BandColumns>> BandColumns::Create(
                                  (2 * answers.rows() * static_cast<int64_t>(sizeof(double)) +
                                   rows * static_cast<int64_t>(sizeof(float)))));
   }
-  TF_ASSIGN_OR_RETURN(const MaterialExpansion expansion,
+  TF_ASSIGN_OR_RETURN(const AnswerExpansion expansion,
                       ExpandLinearElastic(preparation.get(), uncertainty, answers,
                                           ExpansionOrder::kFirst, cancellation));
   auto band = absl::WrapUnique(new BandColumns(std::move(preparation), *elastic));
-  for (const MaterialExpansion::Term& term : expansion.terms) {
+  for (const AnswerExpansion::Term& term : expansion.terms) {
     Eigen::MatrixXf& columns = band->columns_.emplace_back(rows, answers.cols());
     for (size_t v = 0; v < vertices.size(); ++v) {
       columns.middleRows<3>(3 * static_cast<Eigen::Index>(v)) =

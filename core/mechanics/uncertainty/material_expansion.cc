@@ -14,6 +14,7 @@
 #include "core/mechanics/elasticity/neo_hookean_energy.h"
 #include "core/mechanics/elasticity/neo_hookean_tangent.h"
 #include "core/mechanics/linear_solvers/dirichlet_system.h"
+#include "core/mechanics/uncertainty/held_contact.h"
 
 namespace tissueform {
 namespace {
@@ -37,12 +38,15 @@ std::vector<int32_t> ConstrainedUnknowns(const ConstraintSet& constraints) {
 class Expander {
  public:
   Expander(const MeshPreparation& preparation, const MaterialUncertainty& uncertainty,
-           LawAtState law, ExpansionOrder order, const Cancellation& cancellation)
+           LawAtState law, ExpansionOrder order, const Cancellation& cancellation,
+           const SparseMatrix* held)
       : preparation_(preparation),
         uncertainty_(uncertainty),
         law_(std::move(law)),
         order_(order),
-        cancellation_(cancellation) {}
+        cancellation_(cancellation) {
+    if (held != nullptr) held_ = *held;
+  }
 
   absl::StatusOr<std::unique_ptr<DirichletSystem>> Factorise(double poisson_ratio) const {
     return DirichletSystem::Create(law_.tangent(preparation_.stiffness(), poisson_ratio),
@@ -54,9 +58,10 @@ class Expander {
                                    cancellation_);
   }
 
-  absl::StatusOr<MaterialExpansion> Expand(const DirichletSystem& system) {
-    TF_RETURN_IF_ERROR(ExpandTissues(system));
-    if (order_ == ExpansionOrder::kSecond) TF_RETURN_IF_ERROR(ExpandPairs(system));
+  absl::StatusOr<AnswerExpansion> Expand(const DirichletSystem& system) {
+    TF_ASSIGN_OR_RETURN(const HeldResponse response, HeldIn(system));
+    TF_RETURN_IF_ERROR(ExpandTissues(response));
+    if (order_ == ExpansionOrder::kSecond) TF_RETURN_IF_ERROR(ExpandPairs(response));
     if (uncertainty_.poisson_ratio_95) TF_RETURN_IF_ERROR(ExpandPoissonRatio());
     return std::move(expansion_);
   }
@@ -76,23 +81,18 @@ class Expander {
 
   double poisson_ratio() const { return preparation_.options().poisson_ratio; }
 
-  // Constrained vertices stay where they are.
-  static absl::StatusOr<Eigen::MatrixXd> Respond(const DirichletSystem& system,
-                                                 const Eigen::MatrixXd& forces,
-                                                 const ConstraintSet& constraints) {
-    const auto rows = 3 * static_cast<Eigen::Index>(constraints.constrained().size());
-    return system.Solve(forces, Eigen::MatrixXd::Zero(rows, forces.cols()));
+  absl::StatusOr<HeldResponse> HeldIn(const DirichletSystem& system) const {
+    return HeldResponse::Create(system, held_, cancellation_);
   }
 
-  absl::Status ExpandTissues(const DirichletSystem& system) {
+  absl::Status ExpandTissues(const HeldResponse& response) {
     const auto tissues = static_cast<int>(uncertainty_.tissues.size());
     expansion_.variables = tissues;
     for (int i = 0; i < tissues; ++i) {
       TF_RETURN_IF_ERROR(cancellation_.Check());
       const Eigen::VectorXd stiffness = StiffnessOf(i);
       forces_.push_back(Sigma(i) * law_.forces(stiffness, poisson_ratio()));
-      TF_ASSIGN_OR_RETURN(Eigen::MatrixXd field,
-                          Respond(system, -forces_.back(), preparation_.constraints()));
+      TF_ASSIGN_OR_RETURN(Eigen::MatrixXd field, response.Respond(-forces_.back()));
       expansion_.terms.push_back({.first = i, .field = std::move(field)});
       if (order_ == ExpansionOrder::kSecond) {
         // Most entries of one tissue's matrix are zeros of the others.
@@ -103,7 +103,7 @@ class Expander {
     return absl::OkStatus();
   }
 
-  absl::Status ExpandPairs(const DirichletSystem& system) {
+  absl::Status ExpandPairs(const HeldResponse& response) {
     const int tissues = expansion_.variables;
     for (int i = 0; i < tissues; ++i) {
       const auto row = static_cast<size_t>(i);
@@ -116,8 +116,7 @@ class Expander {
         } else {
           forces += tangents_[column] * expansion_.terms[row].field;
         }
-        TF_ASSIGN_OR_RETURN(Eigen::MatrixXd field,
-                            Respond(system, -forces, preparation_.constraints()));
+        TF_ASSIGN_OR_RETURN(Eigen::MatrixXd field, response.Respond(-forces));
         expansion_.terms.push_back({.first = i, .second = j, .field = std::move(field)});
       }
     }
@@ -129,8 +128,8 @@ class Expander {
   absl::StatusOr<Eigen::MatrixXd> MoveTo(double poisson_ratio) const {
     TF_RETURN_IF_ERROR(cancellation_.Check());
     TF_ASSIGN_OR_RETURN(const auto system, Factorise(poisson_ratio));
-    return Respond(*system, -law_.forces(preparation_.stiffness(), poisson_ratio),
-                   preparation_.constraints());
+    TF_ASSIGN_OR_RETURN(const HeldResponse response, HeldIn(*system));
+    return response.Respond(-law_.forces(preparation_.stiffness(), poisson_ratio));
   }
 
   absl::Status ExpandPoissonRatio() {
@@ -151,21 +150,28 @@ class Expander {
   const LawAtState law_;
   const ExpansionOrder order_;
   const Cancellation& cancellation_;
+  SparseMatrix held_;  // without columns where there is no contact
 
   std::vector<Eigen::MatrixXd> forces_;  // of each tissue, times its sigma
   std::vector<SparseMatrix> tangents_;   // likewise
-  MaterialExpansion expansion_;
+  AnswerExpansion expansion_;
 };
+
+// What holds an answer with contact has to be said.
+absl::Status CheckHeld(const MeshPreparation& preparation, const SparseMatrix* held) {
+  if (held != nullptr) return absl::OkStatus();
+  return CheckWithoutContact(preparation.constraints(), "the band of uncertainty");
+}
 
 }  // namespace
 
-absl::StatusOr<MaterialExpansion> ExpandLinearElastic(MeshPreparation* preparation,
-                                                      const MaterialUncertainty& uncertainty,
-                                                      const Eigen::MatrixXd& displacements,
-                                                      ExpansionOrder order,
-                                                      const Cancellation& cancellation) {
-  TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(), "the band of uncertainty"));
-  TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
+absl::StatusOr<AnswerExpansion> ExpandLinearElastic(MeshPreparation* preparation,
+                                                    const MaterialUncertainty& uncertainty,
+                                                    const Eigen::MatrixXd& displacements,
+                                                    ExpansionOrder order,
+                                                    const Cancellation& cancellation,
+                                                    const SparseMatrix* held) {
+  TF_RETURN_IF_ERROR(CheckHeld(*preparation, held));
   LawAtState law;
   law.tangent = [preparation](const Eigen::VectorXd& stiffness, double poisson_ratio) {
     return ElasticStiffness(preparation->elements(), preparation->vertex_cells(), stiffness,
@@ -174,13 +180,22 @@ absl::StatusOr<MaterialExpansion> ExpandLinearElastic(MeshPreparation* preparati
   law.forces = [&](const Eigen::VectorXd& stiffness, double poisson_ratio) {
     return Eigen::MatrixXd(law.tangent(stiffness, poisson_ratio) * displacements);
   };
-  return Expander(*preparation, uncertainty, law, order, cancellation).Expand(elastic->system());
+  Expander expander(*preparation, uncertainty, law, order, cancellation, held);
+  if (held == nullptr) {
+    TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
+    return expander.Expand(elastic->system());
+  }
+  // The unknowns of the preparation's own factor are turned where tissue slides.
+  TF_ASSIGN_OR_RETURN(const auto system, expander.Factorise(preparation->options().poisson_ratio));
+  return expander.Expand(*system);
 }
 
-absl::StatusOr<MaterialExpansion> ExpandNeoHookean(MeshPreparation* preparation,
-                                                   const MaterialUncertainty& uncertainty,
-                                                   const Positions& deformed, ExpansionOrder order,
-                                                   const Cancellation& cancellation) {
+absl::StatusOr<AnswerExpansion> ExpandNeoHookean(MeshPreparation* preparation,
+                                                 const MaterialUncertainty& uncertainty,
+                                                 const Positions& deformed, ExpansionOrder order,
+                                                 const Cancellation& cancellation,
+                                                 const SparseMatrix* held) {
+  TF_RETURN_IF_ERROR(CheckHeld(*preparation, held));
   const Positions displacements = deformed - preparation->mesh().positions();
   const int threads = preparation->options().threads;
   LawAtState law;
@@ -195,7 +210,7 @@ absl::StatusOr<MaterialExpansion> ExpandNeoHookean(MeshPreparation* preparation,
     energy.Evaluate(displacements, &gradient);
     return Eigen::MatrixXd(Eigen::Map<const Eigen::VectorXd>(gradient.data(), gradient.size()));
   };
-  Expander expander(*preparation, uncertainty, law, order, cancellation);
+  Expander expander(*preparation, uncertainty, law, order, cancellation, held);
   TF_ASSIGN_OR_RETURN(const auto system, expander.Factorise(preparation->options().poisson_ratio));
   return expander.Expand(*system);
 }

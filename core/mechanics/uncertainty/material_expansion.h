@@ -14,11 +14,11 @@
 
 namespace tissueform {
 
-// How an elastic answer changes with its material, as a polynomial in independent standard normal
-// variables z: one a tissue, its stiffness being multiplied by exp(sigma z) with sigma =
-// log(factor_95) / kNormal95, and then one for Poisson's ratio where that is uncertain. All is zero
-// at constrained vertices.
-struct MaterialExpansion {
+// How an elastic answer changes with what is not known, as a polynomial in independent standard
+// normal variables z. Of its material: one variable a tissue, its stiffness being multiplied by
+// exp(sigma z) with sigma = log(factor_95) / kNormal95, and then one for Poisson's ratio where that
+// is uncertain; all is zero at constrained vertices. Of surgery: surgery_expansion.h.
+struct AnswerExpansion {
   static constexpr int kNone = -1;
   // The displacement `field` times z_first, or times z_first z_second.
   struct Term {
@@ -39,12 +39,18 @@ enum class ExpansionOrder { kFirst, kSecond };
 // the equilibria at both ends of its range (two factors more, one at a time), a parabola in its
 // variable, or with kFirst their mean slope. Products of its variable with others are left out.
 //
-// Errors: those of MeshPreparation::Elastic and of DirichletSystem.
-absl::StatusOr<MaterialExpansion> ExpandLinearElastic(MeshPreparation* preparation,
-                                                      const MaterialUncertainty& uncertainty,
-                                                      const Eigen::MatrixXd& displacements,
-                                                      ExpansionOrder order,
-                                                      const Cancellation& cancellation = {});
+// With contact, `held` are the directions that hold the answer (HeldDirections) and stay as they
+// are: the expansion is that of the answer while no other row opens or closes. Null without
+// contact.
+//
+// Errors: those of MeshPreparation::Elastic and of DirichletSystem; InvalidArgument where there are
+// contact rows and `held` is null.
+absl::StatusOr<AnswerExpansion> ExpandLinearElastic(MeshPreparation* preparation,
+                                                    const MaterialUncertainty& uncertainty,
+                                                    const Eigen::MatrixXd& displacements,
+                                                    ExpansionOrder order,
+                                                    const Cancellation& cancellation = {},
+                                                    const SparseMatrix* held = nullptr);
 
 // Of a neo-Hookean equilibrium `deformed` (#V by 3, mm; every tet positive): the same with the
 // tangent of the energy there in place of K, the forces that tissue i exerts there in place of K_i
@@ -52,10 +58,12 @@ absl::StatusOr<MaterialExpansion> ExpandLinearElastic(MeshPreparation* preparati
 // order; in second order the third derivatives of the energy are left out.
 //
 // Errors: FailedPrecondition where the tangent is not positive definite (`deformed` is no stable
-// equilibrium), ResourceExhausted, or what the preparation's admission says; Cancelled.
-absl::StatusOr<MaterialExpansion> ExpandNeoHookean(MeshPreparation* preparation,
-                                                   const MaterialUncertainty& uncertainty,
-                                                   const Positions& deformed, ExpansionOrder order,
-                                                   const Cancellation& cancellation = {});
+// equilibrium), ResourceExhausted, or what the preparation's admission says; Cancelled;
+// InvalidArgument as above.
+absl::StatusOr<AnswerExpansion> ExpandNeoHookean(MeshPreparation* preparation,
+                                                 const MaterialUncertainty& uncertainty,
+                                                 const Positions& deformed, ExpansionOrder order,
+                                                 const Cancellation& cancellation = {},
+                                                 const SparseMatrix* held = nullptr);
 
 }  // namespace tissueform

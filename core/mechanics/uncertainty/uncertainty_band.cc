@@ -31,23 +31,23 @@ double NormalQuantile(double probability) {
 }
 
 // #terms by #samples: the products of variables that the terms' fields are multiplied with.
-Eigen::MatrixXd Monomials(const MaterialExpansion& expansion) {
+Eigen::MatrixXd Monomials(const AnswerExpansion& expansion) {
   const Eigen::MatrixXd z = NormalSamples(kSamples, expansion.variables);
   Eigen::MatrixXd monomials(static_cast<Eigen::Index>(expansion.terms.size()), kSamples);
   for (size_t t = 0; t < expansion.terms.size(); ++t) {
-    const MaterialExpansion::Term& term = expansion.terms[t];
+    const AnswerExpansion::Term& term = expansion.terms[t];
     auto row = monomials.row(static_cast<Eigen::Index>(t));
     row = z.col(term.first).transpose();
-    if (term.second != MaterialExpansion::kNone)
+    if (term.second != AnswerExpansion::kNone)
       row.array() *= z.col(term.second).transpose().array();
   }
   return monomials;
 }
 
 // Reorders.
-double Percentile95(std::vector<double>* values) {
+double Percentile(double part, std::vector<double>* values) {
   const auto at =
-      values->begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(values->size()));
+      values->begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values->size()));
   std::nth_element(values->begin(), at, values->end());
   return *at;
 }
@@ -91,7 +91,7 @@ Eigen::MatrixXd NormalSamples(int samples, int variables) {
   return z;
 }
 
-UncertaintyBand SampleBand(const MaterialExpansion& expansion, const Positions& normals,
+UncertaintyBand SampleBand(const AnswerExpansion& expansion, const Positions& normals,
                            int threads) {
   const Eigen::MatrixXd monomials = Monomials(expansion);
   const Eigen::Index vertices = normals.rows();
@@ -109,13 +109,25 @@ UncertaintyBand SampleBand(const MaterialExpansion& expansion, const Positions& 
       if (fields.isZero(0)) continue;
       moves.noalias() = fields * monomials;
       row = moves.colwise().norm();
-      band.size_mm[v] = Percentile95(&values);
+      band.size_mm[v] = Percentile(0.95, &values);
       if (normals.row(v).isZero(0)) continue;
       row = (normals.row(v) * moves).cwiseAbs();
-      band.normal_mm[v] = Percentile95(&values);
+      band.normal_mm[v] = Percentile(0.95, &values);
     }
   });
   return band;
+}
+
+BandInterval SampleAlong(const AnswerExpansion& expansion, int32_t vertex,
+                         const Eigen::Vector3d& direction) {
+  Eigen::RowVectorXd fields(static_cast<Eigen::Index>(expansion.terms.size()));
+  for (Eigen::Index t = 0; t < fields.size(); ++t) {
+    const Eigen::MatrixXd& field = expansion.terms[static_cast<size_t>(t)].field;
+    fields[t] = direction.dot(field.col(0).segment<3>(3 * vertex));
+  }
+  const Eigen::RowVectorXd along = fields * Monomials(expansion);
+  std::vector<double> values(along.begin(), along.end());
+  return {.low_mm = Percentile(0.025, &values), .high_mm = Percentile(0.975, &values)};
 }
 
 Eigen::VectorXf FirstOrderBand(const Eigen::Ref<const Eigen::MatrixXf>& fields) {

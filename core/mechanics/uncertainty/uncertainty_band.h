@@ -3,6 +3,10 @@
 
 #pragma once
 
+#include <cstdint>
+
+#include <Eigen/Core>
+
 #include "core/base/types.h"
 #include "core/mechanics/uncertainty/material_expansion.h"
 #include "core/mesh/tet_mesh.h"
@@ -28,8 +32,16 @@ Eigen::MatrixXd NormalSamples(int samples, int variables);
 
 // By 512 samples of the polynomial of an expansion of one column. `normals` as SurfaceNormals gives
 // them. Does not depend on `threads`.
-UncertaintyBand SampleBand(const MaterialExpansion& expansion, const Positions& normals,
-                           int threads);
+UncertaintyBand SampleBand(const AnswerExpansion& expansion, const Positions& normals, int threads);
+
+// The 95 % interval, in mm, of what an expansion of one column adds at a vertex along `direction`
+// (of length 1): from the same samples, 2.5 % beyond either end.
+struct BandInterval {
+  double low_mm = 0;
+  double high_mm = 0;
+};
+BandInterval SampleAlong(const AnswerExpansion& expansion, int32_t vertex,
+                         const Eigen::Vector3d& direction);
 
 // The sizes alone, quickly, from the terms of first order: the distance is then the length of a
 // normal vector with covariance C, whose square is taken for a multiple of a chi-squared variable

@@ -36,6 +36,12 @@ Triangles TrianglesOf(const TriangleMesh& surface) {
   return triangles;
 }
 
+Eigen::RowVector3d NormalOf(const Kernel::Triangle_3& triangle) {
+  const Kernel::Vector_3 normal =
+      CGAL::cross_product(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+  return Eigen::RowVector3d(normal.x(), normal.y(), normal.z()).normalized();
+}
+
 }  // namespace
 
 Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
@@ -75,6 +81,20 @@ Positions NearestPoints::Of(const Positions& points) const {
   for (Eigen::Index p = 0; p < points.rows(); ++p) {
     const Kernel::Point_3 at = search_->tree.closest_point(PointOf(points, p));
     nearest.row(p) << at.x(), at.y(), at.z();
+  }
+  return nearest;
+}
+
+SurfacePoints NearestPoints::WithNormals(const Positions& points) const {
+  SurfacePoints nearest{.points = Positions(points.rows(), 3),
+                        .normals = Positions(points.rows(), 3),
+                        .triangles = {}};
+  nearest.triangles.reserve(static_cast<size_t>(points.rows()));
+  for (Eigen::Index p = 0; p < points.rows(); ++p) {
+    const auto [at, triangle] = search_->tree.closest_point_and_primitive(PointOf(points, p));
+    nearest.points.row(p) << at.x(), at.y(), at.z();
+    nearest.normals.row(p) = NormalOf(*triangle);
+    nearest.triangles.push_back(triangle - search_->triangles.begin());
   }
   return nearest;
 }

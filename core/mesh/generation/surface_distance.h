@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "core/base/types.h"
 #include "core/mesh/triangle_mesh.h"
@@ -16,6 +17,14 @@ namespace tissueform {
 // REQUIRES: positions are finite.
 Eigen::VectorXd DistancesToSurface(const Positions& points, const TriangleMesh& surface,
                                    int threads = 1);
+
+// Points of a surface, #P by 3, the unit normals of the triangles in which they lie (0 0 0 where
+// one has no area), and the numbers of these triangles.
+struct SurfacePoints {
+  Positions points;
+  Positions normals;
+  std::vector<Eigen::Index> triangles;
+};
 
 // The points of one surface that are nearest to other points, by a search tree that is made once.
 // Not for several threads at a time.
@@ -30,6 +39,7 @@ class NearestPoints {
 
   // For points (#P by 3), #P by 3.
   Positions Of(const Positions& points) const;
+  SurfacePoints WithNormals(const Positions& points) const;
 
  private:
   struct Search;

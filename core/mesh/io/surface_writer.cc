@@ -37,28 +37,31 @@ Soup ToSoup(const TriangleMesh& mesh) {
 // A binary STL begins with bytes that readers pass over.
 constexpr size_t kStlHeaderBytes = 80;
 constexpr char kStlNotice[] = "Tissueform, not a medical device: not for diagnosis or treatment";
-static_assert(sizeof(kStlNotice) <= kStlHeaderBytes);
+// As 3D Slicer writes and reads it (file_space.h).
+constexpr char kLpsMark[] = " SPACE=LPS";
+static_assert(sizeof(kStlNotice) + sizeof(kLpsMark) <= kStlHeaderBytes);
 
-std::string StlHeader() {
-  std::string header = kStlNotice;
+std::string StlHeader(const std::string& mark) {
+  std::string header = kStlNotice + mark;
   header.resize(kStlHeaderBytes, ' ');
   return header;
 }
 
 // As a comment where the format has them: behind the first line of OFF and the first two of PLY,
 // which some readers take at their places.
-std::string WithNotice(std::string contents, MeshFormat format) {
+std::string WithNotice(std::string contents, MeshFormat format, const std::string& mark) {
   const size_t first_line_end = contents.find('\n') + 1;
   switch (format) {
     case MeshFormat::kStl:
-      return contents.replace(0, kStlHeaderBytes, StlHeader());
+      return contents.replace(0, kStlHeaderBytes, StlHeader(mark));
     case MeshFormat::kPly:
       return contents.insert(contents.find('\n', first_line_end) + 1,
-                             absl::StrCat("comment ", kNotMedicalDeviceNotice, "\n"));
+                             absl::StrCat("comment ", kNotMedicalDeviceNotice, mark, "\n"));
     case MeshFormat::kOff:
-      return contents.insert(first_line_end, absl::StrCat("# ", kNotMedicalDeviceNotice, "\n"));
+      return contents.insert(first_line_end,
+                             absl::StrCat("# ", kNotMedicalDeviceNotice, mark, "\n"));
     default:
-      return contents.insert(0, absl::StrCat("# ", kNotMedicalDeviceNotice, "\n"));
+      return contents.insert(0, absl::StrCat("# ", kNotMedicalDeviceNotice, mark, "\n"));
   }
 }
 
@@ -80,12 +83,13 @@ bool WriteSoup(const Soup& soup, MeshFormat format, std::ostream& stream) {
 
 }  // namespace
 
-absl::StatusOr<std::string> SurfaceFileContents(const TriangleMesh& mesh, MeshFormat format) {
+absl::StatusOr<std::string> SurfaceFileContents(const TriangleMesh& mesh, MeshFormat format,
+                                                bool states_lps) {
   std::ostringstream stream;
   if (!WriteSoup(ToSoup(mesh), format, stream)) {
     return absl::InternalError("CGAL cannot write the surface");
   }
-  return WithNotice(stream.str(), format);
+  return WithNotice(stream.str(), format, states_lps ? kLpsMark : "");
 }
 
 }  // namespace tissueform

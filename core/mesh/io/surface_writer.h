@@ -14,8 +14,10 @@ namespace tissueform {
 
 // The mesh as an .obj, .off or .ply file, texts whose coordinates are written so that the same
 // doubles are read again, or as a binary .stl file. By CGAL. Internal to core/mesh/io.
+// `states_lps`: whether the header states SPACE=LPS.
 //
 // REQUIRES: one of these four formats.
-absl::StatusOr<std::string> SurfaceFileContents(const TriangleMesh& mesh, MeshFormat format);
+absl::StatusOr<std::string> SurfaceFileContents(const TriangleMesh& mesh, MeshFormat format,
+                                                bool states_lps);
 
 }  // namespace tissueform

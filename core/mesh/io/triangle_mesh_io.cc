@@ -36,7 +36,7 @@ absl::StatusOr<std::string> Serialize(MeshFormat format, const TriangleMeshFile&
   if (!file.point_data.empty() || !file.cell_data.empty()) {
     return absl::InvalidArgumentError("only .vtp keeps arrays; name such a file");
   }
-  return SurfaceFileContents(file.mesh, format);
+  return SurfaceFileContents(file.mesh, format, file.space == FileSpace::kLps);
 }
 
 }  // namespace

@@ -23,7 +23,8 @@ struct TriangleMeshFile {
   std::vector<Attribute> cell_data;   // #F tuples each
   // Faces of the file with more than three corners, each split into a fan. Not written.
   int64_t split_polygons = 0;
-  // What the file states; the mesh is in LPS by then. Not written.
+  // What the file states; the mesh is in LPS by then. kLps is written, where the format has a
+  // header for it.
   FileSpace space = FileSpace::kUnstated;
 };
 

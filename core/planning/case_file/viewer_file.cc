@@ -3,6 +3,7 @@
 
 #include "core/planning/case_file/viewer_file.h"
 
+#include <filesystem>
 #include <fstream>
 #include <utility>
 
@@ -87,6 +88,18 @@ absl::StatusOr<ViewerFile> ReadViewer(const std::string& path) {
   if (contents.ok()) return contents;
   return absl::Status(contents.status().code(),
                       absl::StrCat(path, ": ", contents.status().message()));
+}
+
+absl::StatusOr<std::optional<ViewerFile>> FindViewerOf(const std::string& mesh_path) {
+  const std::filesystem::path path = std::filesystem::path(mesh_path).parent_path() / kViewerFile;
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) return std::nullopt;
+  TF_ASSIGN_OR_RETURN(ViewerFile viewer, ReadViewer(path.string()));
+  TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256(mesh_path));
+  if (viewer.mesh_file_sha256 == mesh_sha256) return viewer;
+  return absl::FailedPreconditionError(
+      absl::StrCat(path.string(), " belongs to a different mesh than ", mesh_path,
+                   "; build the plan again, or remove the file to show only the mesh"));
 }
 
 }  // namespace tissueform

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,5 +45,9 @@ absl::StatusOr<std::string> SerializeViewer(const ViewerFile& contents);
 absl::StatusOr<ViewerFile> ParseViewer(absl::string_view bytes);
 // The same of a file; messages begin with its path. Errors: also NotFound.
 absl::StatusOr<ViewerFile> ReadViewer(const std::string& path);
+
+// The viewer file beside a mesh file; nothing where there is none. Errors: those of ReadViewer;
+// FailedPrecondition when it belongs to another mesh.
+absl::StatusOr<std::optional<ViewerFile>> FindViewerOf(const std::string& mesh_path);
 
 }  // namespace tissueform

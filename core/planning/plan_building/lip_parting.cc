@@ -242,11 +242,7 @@ void AppendDoubles(const std::vector<int32_t>& originals, PlanningRegions* regio
 absl::StatusOr<MouthLine> ChooseMouthLine(const RecipeLips& lips, const HeadSegmentation& head,
                                           const Landmarks& landmarks) {
   if (!lips.mouth_line_mm.empty()) return MouthLineThrough(lips.mouth_line_mm, landmarks);
-  absl::StatusOr<MouthLine> found = FindMouthLine(head, landmarks);
-  if (found.ok()) return found;
-  return absl::InvalidArgumentError(
-      absl::StrCat("the lips cannot be parted: ", found.status().message(),
-                   "; give \"lips\": {\"mouth_line_mm\": ...} in the recipe, or leave it out"));
+  return FindMouthLine(head, landmarks);
 }
 
 absl::StatusOr<SeamInMesh> PutSeamInMesh(LipSeam seam, SoftTissueMesh* made) {

@@ -27,7 +27,7 @@ namespace tissueform {
 // The line of the recipe, or else the one that the CT shows.
 //
 // Errors: InvalidArgument when the recipe's line does not run from right to left or is wider than a
-// mouth, or when the CT shows none; it names the key to give.
+// mouth, or when the CT shows none.
 absl::StatusOr<MouthLine> ChooseMouthLine(const RecipeLips& lips, const HeadSegmentation& head,
                                           const Landmarks& landmarks);
 

@@ -34,6 +34,7 @@ void SendRequest(const PlanBuildRequest& request, PipeSender* to) {
   to->Number(request.threads);
   to->Number(request.pictures ? 1 : 0);
   to->Number(request.only_compare_labels ? 1 : 0);
+  to->Number(request.only_write_inputs ? 1 : 0);
 }
 
 absl::StatusOr<PlanBuildRequest> ReceiveRequest(PipeReceiver* from) {
@@ -45,7 +46,9 @@ absl::StatusOr<PlanBuildRequest> ReceiveRequest(PipeReceiver* from) {
   TF_ASSIGN_OR_RETURN(const int64_t threads, from->Number(kMaxThreads));
   TF_ASSIGN_OR_RETURN(const int64_t pictures, from->Number(1));
   TF_ASSIGN_OR_RETURN(const int64_t only_compare, from->Number(1));
+  TF_ASSIGN_OR_RETURN(const int64_t only_inputs, from->Number(1));
   request.only_compare_labels = only_compare != 0;
+  request.only_write_inputs = only_inputs != 0;
   request.threads = static_cast<int>(threads);
   request.pictures = pictures != 0;
   return request;

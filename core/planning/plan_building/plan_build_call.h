@@ -18,19 +18,32 @@ namespace tissueform {
 // A plan from a CT, made by the program tissueform-plan-build: neither a crash of ITK, CGAL or VTK
 // nor the memory that they take is the caller's, who links none of them.
 struct PlanBuildRequest {
-  std::string ct;             // file or folder, as BuildPlan takes it
+  std::string ct;             // file or folder, as BuildPlan takes it, or a zip of it
   std::string recipe;         // file; may be empty where only labels are compared
-  std::string surfaces = {};  // file, instead of both, as BuildPlanFromSurfaces takes it
-  std::string labels = {};    // file of a label map; empty: that of the recipe, if it names one
+  std::string surfaces = {};  // file, instead of both, as BuildPlanFromSurfaces takes it, or a zip
+  std::string labels =
+      {};  // file of a label map, or a zip of it; empty: that of the recipe, if it names one
   bool only_compare_labels = false;  // no plan: the answer's text compares them with the CT
-  std::string folder;                // is there and empty; gets the plan and its report
-  std::string folder_name;           // what the answer calls it, for it may be renamed afterwards
-  int threads = 1;                   // the plan does not depend on it
-  bool pictures = true;              // in the report: they need an X display or Xvfb
+  bool only_write_inputs = false;    // no plan: the folder gets the BuildInputFiles
+  // Is there and empty; gets the plan and its report. Zips are unpacked in it, and removed again.
+  std::string folder;
+  std::string folder_name;  // what the answer calls it, for it may be renamed afterwards
+  int threads = 1;          // the plan does not depend on it
+  bool pictures = true;     // in the report: they need an X display or Xvfb
   // As much as there is: how much a CT needs is not known before it is read.
   IsolationLimits limits = {.max_memory_bytes = std::numeric_limits<int64_t>::max(),
                             .max_seconds = std::numeric_limits<int>::max(),
                             .max_file_bytes = std::numeric_limits<int64_t>::max()};
+};
+
+// What another machine needs to build the same plan, in request.folder, without anything that names
+// the patient; those of a request without surfaces, or kSurfaces alone.
+struct BuildInputFiles {
+  static constexpr char kCt[] = "ct.mha";
+  static constexpr char kRecipe[] = "recipe.json";
+  static constexpr char kLabels[] = "labels";      // with the ending of its format, if there is one
+  static constexpr char kRecipeFiles[] = "files";  // a folder: as the recipe names them
+  static constexpr char kSurfaces[] = "surfaces.zip";
 };
 
 struct PlanBuildCallOptions {

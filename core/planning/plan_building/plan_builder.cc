@@ -4,6 +4,7 @@
 #include "core/planning/plan_building/plan_builder.h"
 
 #include <algorithm>
+#include <future>
 #include <optional>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "core/imaging/anatomy/head_checks.h"
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/imaging/anatomy/surface_extraction.h"
+#include "core/planning/plan_building/given_pieces.h"
 #include "core/planning/plan_building/surface_head.h"
 #include "core/planning/plan_building/surfaces_file.h"
 #include "core/planning/plan_building/trial_solve.h"
@@ -60,6 +62,7 @@ class Progress {
 
 struct ResampledCt {
   CtProvenance provenance;
+  CtValuesReport values;
   std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
   std::string frame_uid;  // CtVolume::frame_uid
@@ -74,14 +77,18 @@ struct Anatomy {
   std::optional<FrankfortLandmarks> frankfort;
   HeadFrame frame;
   LabelGrid known_tissue;  // PlanLabels::tissue
+  std::vector<std::string> notes;
 };
 
 // What CT and surfaces lead to alike, and from which a plan is built.
 struct Source {
   CtProvenance provenance;
+  std::vector<std::string> surface_roles;  // PlanBuild::surface_roles
+  CtValuesReport values;
   std::array<int, 3> size = {0, 0, 0};
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
   MetalReport metal;
+  LabelGrid carried_skin;
   HuGrid before_correction;
   Anatomy anatomy;
   std::optional<PlanLabels> labels;
@@ -101,12 +108,22 @@ struct Description {
   SkinDistance skin_distance;
 };
 
+// Gray values have thresholds of their own.
+Recipe WithThresholds(Recipe recipe, const CtValuesReport& values) {
+  if (!values.gray) return recipe;
+  recipe.segmentation.tissue_above_hu = values.tissue_above_hu;
+  recipe.segmentation.bone_above_hu = values.bone_above_hu;
+  return recipe;
+}
+
 absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Recipe& recipe,
                                             int threads, Progress* progress) {
   progress->Begin("reading the CT", 0, 0.08);
   TF_ASSIGN_OR_RETURN(CtVolume volume, ReadCtVolume(ct_path, recipe.ct));
+  TF_ASSIGN_OR_RETURN(CtValuesReport values, PrepareValues(recipe.ct, &volume));
   progress->Begin("reducing metal artifacts, resampling", 0.08, 0.12);
   ResampledCt result{.provenance = std::move(volume.provenance),
+                     .values = {},
                      .size = volume.size,
                      .spacing_mm = volume.spacing_mm,
                      .frame_uid = volume.frame_uid,
@@ -115,13 +132,16 @@ absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Re
   TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
                                                         recipe.metal, threads));
   result.unscanned = std::move(result.ct.unscanned);
+  result.values = std::move(values);
   return result;
 }
 
-absl::StatusOr<Anatomy> WithFrame(HeadSegmentation head, BoneParts parts,
-                                  const Landmarks& landmarks, const Recipe& recipe) {
-  const std::optional<FrankfortLandmarks> frankfort =
+absl::StatusOr<Anatomy> WithFrame(HeadSegmentation head, BoneParts parts, Landmarks landmarks,
+                                  const Recipe& recipe) {
+  std::optional<FrankfortLandmarks> frankfort =
       FindFrankfort(head.hu, head.options.bone_above_hu, landmarks);
+  std::vector<std::string> notes;
+  TF_RETURN_IF_ERROR(PlaceLandmarks(recipe.landmarks, &landmarks, &frankfort, &notes));
   TF_ASSIGN_OR_RETURN(HeadFrame frame, ChooseHeadFrame({.landmarks = landmarks,
                                                         .frankfort = frankfort,
                                                         .given_midsagittal = recipe.midsagittal,
@@ -131,7 +151,8 @@ absl::StatusOr<Anatomy> WithFrame(HeadSegmentation head, BoneParts parts,
                  .landmarks = landmarks,
                  .frankfort = frankfort,
                  .frame = std::move(frame),
-                 .known_tissue = {}};
+                 .known_tissue = {},
+                 .notes = std::move(notes)};
 }
 
 struct HeadAndBone {
@@ -140,12 +161,12 @@ struct HeadAndBone {
 };
 
 // `labels` may be empty; gets the comparison with what the image alone shows.
-absl::StatusOr<HeadAndBone> SegmentBone(const CtWithMetal& ct, const LabelGrid& unscanned,
-                                        const Recipe& recipe, std::optional<PlanLabels>* labels,
-                                        Progress* progress) {
+absl::StatusOr<HeadAndBone> SegmentBone(const ResampledCt& ct, const Recipe& recipe,
+                                        std::optional<PlanLabels>* labels, Progress* progress) {
   progress->Begin("finding head and bone", 0.12, 0.3);
-  TF_ASSIGN_OR_RETURN(HeadSegmentation head, SegmentHead(ct.hu, recipe.segmentation,
-                                                         progress->Parts(), ct.metal, unscanned));
+  TF_ASSIGN_OR_RETURN(
+      HeadSegmentation head,
+      SegmentHead(ct.ct.hu, recipe.segmentation, progress->Parts(), ct.ct.metal, ct.unscanned));
   progress->Begin("separating bones", 0.3, 0.42);
   absl::StatusOr<BoneParts> parts =
       SeparateBoneParts(head, recipe.occlusal_plane, progress->Parts());
@@ -154,10 +175,9 @@ absl::StatusOr<HeadAndBone> SegmentBone(const CtWithMetal& ct, const LabelGrid& 
   return HeadAndBone{std::move(head), std::move(parts)};
 }
 
-absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unscanned,
-                                    const Recipe& recipe, std::optional<PlanLabels>* labels,
-                                    Progress* progress) {
-  TF_ASSIGN_OR_RETURN(HeadAndBone bone, SegmentBone(ct, unscanned, recipe, labels, progress));
+absl::StatusOr<Anatomy> FindAnatomy(const ResampledCt& ct, const Recipe& recipe,
+                                    std::optional<PlanLabels>* labels, Progress* progress) {
+  TF_ASSIGN_OR_RETURN(HeadAndBone bone, SegmentBone(ct, recipe, labels, progress));
   HeadSegmentation& head = bone.head;
   absl::StatusOr<BoneParts>& parts = bone.parts;
   const bool plane_given = recipe.occlusal_plane.has_value();
@@ -166,7 +186,7 @@ absl::StatusOr<Anatomy> FindAnatomy(const CtWithMetal& ct, const LabelGrid& unsc
   const absl::StatusOr<Landmarks> landmarks = FindLandmarks(head, *parts);
   const absl::Status found = landmarks.ok() ? CheckLandmarks(*landmarks) : landmarks.status();
   if (!found.ok()) return ExplainMissingAnatomy(head, plane_given, found);
-  TF_RETURN_IF_ERROR(CheckOneHead(ct.hu, head, *parts));
+  TF_RETURN_IF_ERROR(CheckOneHead(ct.ct.hu, head, *parts));
   TF_ASSIGN_OR_RETURN(Anatomy anatomy,
                       WithFrame(std::move(head), *std::move(parts), *landmarks, recipe));
   if (labels->has_value()) anatomy.known_tissue = std::move((*labels)->tissue);
@@ -286,12 +306,18 @@ absl::StatusOr<SoftTissueMesh> Mesh(const SoftTissue& soft_tissue, const Landmar
 }
 
 // The seam on which the lips will part, where the recipe wants it.
-absl::StatusOr<std::optional<SeamInMesh>> MakeSeam(const Anatomy& anatomy, const Recipe& recipe,
-                                                   SoftTissueMesh* mesh) {
+absl::StatusOr<std::optional<SeamInMesh>> MakeSeam(const Anatomy& anatomy,
+                                                   const absl::StatusOr<MouthLine>& line,
+                                                   const Recipe& recipe, SoftTissueMesh* mesh) {
   if (!recipe.lips.part) return std::nullopt;
-  TF_ASSIGN_OR_RETURN(const MouthLine line,
-                      ChooseMouthLine(recipe.lips, anatomy.head, anatomy.landmarks));
-  TF_ASSIGN_OR_RETURN(LipSeam seam, LipSeam::Create(line, anatomy.parts.labels, anatomy.landmarks));
+  if (!line.ok() && recipe.lips.mouth_line_mm.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the lips cannot be parted: ", line.status().message(),
+                     "; give \"lips\": {\"mouth_line_mm\": ...} in the recipe, or leave it out"));
+  }
+  TF_RETURN_IF_ERROR(line.status());
+  TF_ASSIGN_OR_RETURN(LipSeam seam,
+                      LipSeam::Create(*line, anatomy.parts.labels, anatomy.landmarks));
   TF_ASSIGN_OR_RETURN(SeamInMesh in_mesh, PutSeamInMesh(std::move(seam), mesh));
   return in_mesh;
 }
@@ -305,8 +331,32 @@ double BandMm(const Recipe& recipe, const std::vector<BuiltSegment>& segments) {
   return std::max(kBandVoxels * recipe.spacing_mm, kBandOfMove * largest_move_mm);
 }
 
+// Empty where no segment says it.
+std::vector<double> DissectedMm(const std::vector<RecipeSegment>& segments) {
+  std::vector<double> dissected_mm;
+  dissected_mm.reserve(segments.size());
+  for (const RecipeSegment& segment : segments) dissected_mm.push_back(segment.dissected_mm);
+  const bool is_any = std::any_of(dissected_mm.begin(), dissected_mm.end(),
+                                  [](double distance_mm) { return distance_mm > 0; });
+  return is_any ? dissected_mm : std::vector<double>();
+}
+
+// Gray values tell no tissue: what labels do not name is muscle, as most of a face's depth.
+LabelGrid TissueWithoutHu(const Anatomy& anatomy, const StiffnessTable& table) {
+  constexpr double kMuscleHu = 50;
+  LabelGrid tissue(anatomy.head.hu.geometry, static_cast<uint8_t>(TissueOf(table, kMuscleHu)));
+  for (size_t i = 0; i < anatomy.known_tissue.values.size(); ++i) {
+    if (anatomy.known_tissue.values[i] == 0) continue;
+    tissue.values[i] = static_cast<uint8_t>(anatomy.known_tissue.values[i] - 1);
+  }
+  return tissue;
+}
+
 absl::StatusOr<TetStiffness> Stiffness(const TetMesh& mesh, const Source& source,
                                        const StiffnessTable& table) {
+  if (source.values.gray) {
+    return StiffnessByClass(mesh, TissueWithoutHu(source.anatomy, table), table);
+  }
   if (source.tissue_class) return StiffnessByClass(mesh, *source.tissue_class, table);
   const HeadSegmentation& head = source.anatomy.head;
   return ComputeTetStiffness(mesh, head.hu, head.bone,
@@ -315,7 +365,7 @@ absl::StatusOr<TetStiffness> Stiffness(const TetMesh& mesh, const Source& source
 
 // What the tets are made of and what holds the vertices.
 absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTissue& soft_tissue,
-                                     const Source& source,
+                                     const Source& source, const MouthLine* mouth,
                                      const std::vector<BuiltSegment>& segments,
                                      const Recipe& recipe, int threads, Progress* progress) {
   progress->Begin("assigning stiffness and regions", 0.9, 0.96);
@@ -326,11 +376,14 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
   poses.reserve(segments.size());
   for (const BuiltSegment& segment : segments) poses.push_back(segment.pose);
   const double contact_band_mm = BandMm(recipe, segments);
-  const double tissue_above_hu = recipe.segmentation.tissue_above_hu;
+  const double tissue_above_hu = head.options.tissue_above_hu;
   TF_ASSIGN_OR_RETURN(
       PlanningRegions regions,
       AssignRegions(built.mesh, built.surface.num_vertices(), soft_tissue, NamesOf(segments),
-                    contact_band_mm, anatomy.landmarks, {head.hu, tissue_above_hu, &head.cut}));
+                    {.contact_mm = contact_band_mm,
+                     .dissected_mm = DissectedMm(recipe.segments),
+                     .parts = &anatomy.parts.labels},
+                    anatomy.landmarks, {head.hu, tissue_above_hu, &head.cut, mouth}));
   TF_ASSIGN_OR_RETURN(ContactRelaxation released,
                       ReleaseTornContacts({.mesh = built.mesh,
                                            .youngs_modulus_pa = stiffness.youngs_modulus_pa,
@@ -346,23 +399,35 @@ absl::StatusOr<Description> Describe(const SoftTissueMesh& built, const SoftTiss
                      .skin_distance = std::move(skin_distance)};
 }
 
-absl::StatusOr<Source> SourceOfCt(const std::string& path, const Recipe& recipe, int threads,
+// Replaces what segments name by files, in `planned` as well.
+absl::StatusOr<Source> SourceOfCt(const std::string& path, Recipe* planned, int threads,
                                   Progress* progress) {
-  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(path, recipe, threads, progress));
+  // First: files that cannot be used are refused before the CT takes its time.
+  TF_ASSIGN_OR_RETURN(const SegmentFiles files, ReadSegmentFiles(*planned, threads));
+  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(path, *planned, threads, progress));
+  const Recipe recipe = WithThresholds(*planned, ct.values);
   if (!recipe.labels.file.empty()) progress->Begin("reading the label map", 0.12, 0.12);
   TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
                       ReadPlanLabels(recipe, ct.frame_uid, threads, &ct.ct.hu));
   // The head has HU of its own, as large as the CT's; the next stages need the room.
-  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct.ct, ct.unscanned, recipe, &labels, progress));
+  TF_ASSIGN_OR_RETURN(Anatomy anatomy, FindAnatomy(ct, recipe, &labels, progress));
+  std::vector<std::string>& notes = ct.provenance.notes;
+  notes.insert(notes.end(), anatomy.notes.begin(), anatomy.notes.end());
+  TF_ASSIGN_OR_RETURN(std::optional<LabelGrid> pieces,
+                      PlacePieces(files, threads, planned, &anatomy.head, &anatomy.parts, &notes));
+  ResolveMoves(files, anatomy.landmarks, planned, &notes);
   return Source{.provenance = std::move(ct.provenance),
+                .surface_roles = {},
+                .values = std::move(ct.values),
                 .size = ct.size,
                 .spacing_mm = ct.spacing_mm,
                 .metal = std::move(ct.ct.report),
+                .carried_skin = std::move(ct.ct.carried_skin),
                 .before_correction = std::move(ct.ct.before),
                 .anatomy = std::move(anatomy),
                 .labels = std::move(labels),
                 .tissue_class = {},
-                .segments = {}};
+                .segments = std::move(pieces)};
 }
 
 absl::StatusOr<Source> SourceOfSurfaces(SurfacesInput input, int threads, Progress* progress) {
@@ -378,9 +443,12 @@ absl::StatusOr<Source> SourceOfSurfaces(SurfacesInput input, int threads, Progre
   TF_ASSIGN_OR_RETURN(Anatomy anatomy,
                       FindAnatomyOfSurfaces(std::move(made), input.recipe, progress));
   return Source{.provenance = std::move(input.provenance),
+                .surface_roles = std::move(input.roles),
+                .values = {},
                 .size = geometry.size,
                 .spacing_mm = Eigen::Vector3d::Constant(geometry.spacing_mm),
                 .metal = {},
+                .carried_skin = {},
                 .before_correction = {},
                 .anatomy = std::move(anatomy),
                 .labels = {},
@@ -397,16 +465,16 @@ std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
   return names;
 }
 
-absl::StatusOr<PlanLabels> CompareWithLabels(const std::string& ct_path, const Recipe& recipe,
+absl::StatusOr<PlanLabels> CompareWithLabels(const std::string& ct_path, const Recipe& given,
                                              const PlanBuildOptions& options) {
   Progress progress(options.tell);
   SetFilterThreads(options.threads);
-  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, recipe, options.threads, &progress));
+  TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, given, options.threads, &progress));
+  const Recipe recipe = WithThresholds(given, ct.values);
   TF_ASSIGN_OR_RETURN(std::optional<PlanLabels> labels,
                       ReadPlanLabels(recipe, ct.frame_uid, options.threads, &ct.ct.hu));
   if (!labels) return absl::InvalidArgumentError("no label map is named; use --labels");
-  TF_ASSIGN_OR_RETURN(const HeadAndBone bone,
-                      SegmentBone(ct.ct, ct.unscanned, recipe, &labels, &progress));
+  TF_ASSIGN_OR_RETURN(const HeadAndBone bone, SegmentBone(ct, recipe, &labels, &progress));
   TF_RETURN_IF_ERROR(bone.parts.status());
   return *std::move(labels);
 }
@@ -416,21 +484,37 @@ namespace {
 absl::StatusOr<PlanBuild> BuildFromSource(Source source, const Recipe& recipe,
                                           const PlanBuildOptions& options, Progress& progress) {
   Anatomy& anatomy = source.anatomy;
+  absl::StatusOr<MouthLine> mouth = ChooseMouthLine(recipe.lips, anatomy.head, anatomy.landmarks);
   TF_ASSIGN_OR_RETURN(DividedBone bone,
                       CutBone(anatomy, std::move(source.segments), recipe.segments, &progress));
   TF_ASSIGN_OR_RETURN(SoftTissue soft_tissue,
                       FindSoftTissue(anatomy, bone.labels, recipe, &progress));
+  // Made while one processor is busy with meshing.
+  std::future<absl::StatusOr<std::vector<CaseSurface>>> viewer_surfaces = std::async(
+      options.threads > 1 ? std::launch::async : std::launch::deferred, MakeViewerSurfaces,
+      ViewerSources{.head = anatomy.head,
+                    .outside_air = soft_tissue.outside_air,
+                    .parts = anatomy.parts.labels,
+                    .bone = bone.labels,
+                    .landmarks = anatomy.landmarks,
+                    .segments = NamesOf(bone.segments),
+                    .ct_voxel_mm = source.spacing_mm.maxCoeff()});
   TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh,
                       Mesh(soft_tissue, anatomy.landmarks, recipe, options.threads, &progress));
-  TF_ASSIGN_OR_RETURN(const std::optional<SeamInMesh> seam, MakeSeam(anatomy, recipe, &mesh));
-  TF_ASSIGN_OR_RETURN(Description description, Describe(mesh, soft_tissue, source, bone.segments,
-                                                        recipe, options.threads, &progress));
-  progress.Begin("comparing the mesh with the CT's skin", 0.96, 0.98);
-  TF_ASSIGN_OR_RETURN(SkinCoverage coverage,
-                      MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
-                                          {mesh.surface, description.released.regions,
-                                           soft_tissue.region, &soft_tissue.outside_air},
-                                          source.spacing_mm.maxCoeff(), options.threads));
+  TF_ASSIGN_OR_RETURN(const std::optional<SeamInMesh> seam,
+                      MakeSeam(anatomy, mouth, recipe, &mesh));
+  TF_ASSIGN_OR_RETURN(Description description,
+                      Describe(mesh, soft_tissue, source, mouth.ok() ? &*mouth : nullptr,
+                               bone.segments, recipe, options.threads, &progress));
+  progress.Begin(source.surface_roles.empty() ? "comparing the mesh with the CT's skin"
+                                              : "comparing the mesh with the given skin",
+                 0.96, 0.98);
+  TF_ASSIGN_OR_RETURN(
+      SkinCoverage coverage,
+      MeasureSkinCoverage(anatomy.head, anatomy.landmarks,
+                          {mesh.surface, description.released.regions, soft_tissue.region,
+                           &soft_tissue.outside_air, mouth.ok() ? &*mouth : nullptr},
+                          source.spacing_mm.maxCoeff(), options.threads));
   std::optional<PartedLips> lips;
   if (seam) {
     TF_ASSIGN_OR_RETURN(lips, PartLips(*seam,
@@ -441,21 +525,17 @@ absl::StatusOr<PlanBuild> BuildFromSource(Source source, const Recipe& recipe,
                                        &mesh, &description.released.regions));
   }
   progress.Begin("extracting surfaces for the viewer", 0.98, 1);
-  TF_ASSIGN_OR_RETURN(std::vector<CaseSurface> viewer_surfaces,
-                      MakeViewerSurfaces({.head = anatomy.head,
-                                          .outside_air = soft_tissue.outside_air,
-                                          .parts = anatomy.parts.labels,
-                                          .bone = bone.labels,
-                                          .landmarks = anatomy.landmarks,
-                                          .segments = NamesOf(bone.segments),
-                                          .ct_voxel_mm = source.spacing_mm.maxCoeff()}));
+  TF_ASSIGN_OR_RETURN(std::vector<CaseSurface> shown, viewer_surfaces.get());
   soft_tissue.outside_air = {};  // as large as the CT's grid, and not asked for any more
   TellStage(options.tell, "done", 1);
   return PlanBuild{.recipe = recipe,
                    .ct = std::move(source.provenance),
+                   .surface_roles = std::move(source.surface_roles),
+                   .values = std::move(source.values),
                    .ct_size = source.size,
                    .ct_spacing_mm = source.spacing_mm,
                    .metal = std::move(source.metal),
+                   .carried_skin = std::move(source.carried_skin),
                    .before_correction = std::move(source.before_correction),
                    .head = std::move(anatomy.head),
                    .parts = std::move(anatomy.parts),
@@ -472,10 +552,11 @@ absl::StatusOr<PlanBuild> BuildFromSource(Source source, const Recipe& recipe,
                    .skin_distance = std::move(description.skin_distance),
                    .coverage = std::move(coverage),
                    .labels = std::move(source.labels),
+                   .mouth = std::move(mouth),
                    .lips = std::move(lips),
                    .frankfort = anatomy.frankfort,
                    .head_frame = std::move(anatomy.frame),
-                   .viewer_surfaces = std::move(viewer_surfaces)};
+                   .viewer_surfaces = std::move(shown)};
 }
 
 }  // namespace
@@ -484,8 +565,9 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
                                     const PlanBuildOptions& options) {
   Progress progress(options.tell);
   SetFilterThreads(options.threads);
-  TF_ASSIGN_OR_RETURN(Source source, SourceOfCt(ct_path, recipe, options.threads, &progress));
-  return BuildFromSource(std::move(source), recipe, options, progress);
+  Recipe planned = recipe;
+  TF_ASSIGN_OR_RETURN(Source source, SourceOfCt(ct_path, &planned, options.threads, &progress));
+  return BuildFromSource(std::move(source), planned, options, progress);
 }
 
 absl::StatusOr<PlanBuild> BuildPlanFromSurfaces(const std::string& path,

@@ -15,10 +15,12 @@
 #include "core/imaging/anatomy/grid_operations.h"
 #include "core/imaging/anatomy/head_segmentation.h"
 #include "core/imaging/anatomy/landmarks.h"
+#include "core/imaging/anatomy/mouth_line.h"
 #include "core/imaging/anatomy/osteotomy.h"
 #include "core/imaging/anatomy/soft_tissue.h"
 #include "core/imaging/anatomy/tet_stiffness.h"
 #include "core/imaging/ct/ct_volume.h"
+#include "core/imaging/ct/gray_values.h"
 #include "core/imaging/metal/metal_reduction.h"
 #include "core/mechanics/constraints/head_frame.h"
 #include "core/mechanics/problem/plan_problem.h"
@@ -53,11 +55,14 @@ std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments);
 struct PlanBuild {
   Recipe recipe;
   CtProvenance ct;
+  std::vector<std::string> surface_roles = {};  // of a plan from surfaces alone; empty: from a CT
+  CtValuesReport values = {};
   std::array<int, 3> ct_size = {0, 0, 0};
   Eigen::Vector3d ct_spacing_mm = Eigen::Vector3d::Zero();
   MetalReport metal;
-  HuGrid before_correction;  // the resampled CT about the metal before its streaks were lessened
-  HeadSegmentation head;     // its geometry is the resampled CT's
+  LabelGrid carried_skin = {};  // CtWithMetal::carried_skin
+  HuGrid before_correction;     // the resampled CT about the metal before its streaks were lessened
+  HeadSegmentation head;        // its geometry is the resampled CT's
   BoneParts parts;
   LabelGrid bone;  // 0 none, 1 stays, 2.. the segments; on the head's grid
   Landmarks landmarks;
@@ -71,7 +76,9 @@ struct PlanBuild {
   int64_t num_inverted = 0;           // tets that it could not keep from turning inside out
   SkinDistance skin_distance;
   SkinCoverage coverage;
-  std::optional<PlanLabels> labels = {};             // where the recipe names a label map
+  std::optional<PlanLabels> labels = {};  // where the recipe names a label map
+  // Where the regions of the lips meet, and where the lips part; an error where the CT shows none.
+  absl::StatusOr<MouthLine> mouth = absl::UnknownError("not looked for");
   std::optional<PartedLips> lips = {};               // where the recipe parts them
   std::optional<FrankfortLandmarks> frankfort = {};  // where they were found
   HeadFrame head_frame = {};

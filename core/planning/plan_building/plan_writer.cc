@@ -116,7 +116,7 @@ TetMeshFile MeshFile(const PlanBuild& build) {
   const TetStiffness& stiffness = build.stiffness;
   std::vector<Attribute> of_points = {{kAnatomyArray, 1, build.regions.anatomy},
                                       {"skin_region", 1, build.regions.skin_region}};
-  if (build.lips) of_points.push_back({"contact", 1, build.lips->contact});
+  if (build.lips) of_points.push_back({kContactArray, 1, build.lips->contact});
   return {.mesh = build.mesh.mesh,
           .point_data = std::move(of_points),
           .cell_data = {{"mean_hu", 1, stiffness.mean_hu},

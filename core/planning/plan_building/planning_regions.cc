@@ -98,19 +98,73 @@ void FreeCutsNearSegments(const TetMesh& mesh, const LabelGrid& labels,
   }
 }
 
+// The jaw, or the skull, that most of a piece was cut from.
+uint8_t PartOf(const LabelGrid& labels, const LabelGrid& parts, uint8_t label) {
+  std::array<int64_t, 256> count{};
+  for (size_t i = 0; i < labels.values.size(); ++i) {
+    if (labels.values[i] == label) ++count[parts.values[i]];
+  }
+  return static_cast<uint8_t>(std::max_element(count.begin(), count.end()) - count.begin());
+}
+
+// Pieces are cut out of what has a smaller label: where such bone of the same part is dissected, it
+// lets tissue go, and the piece does not.
+FloatGrid DistanceFromContacts(const LabelGrid& labels, const FreeBands& bands, uint8_t own) {
+  if (bands.DissectedMm(own) == 0) return DistanceFromOtherBone(labels, own);
+  const uint8_t part = PartOf(labels, *bands.parts, own);
+  LabelGrid others(labels.geometry);
+  for (size_t i = 0; i < labels.values.size(); ++i) {
+    const uint8_t label = labels.values[i];
+    const bool is_other = label != kAir && label != kSoftTissue && label != own;
+    others.values[i] = is_other && (label > own || bands.parts->values[i] != part) ? 1 : 0;
+  }
+  return DistanceMm(others);
+}
+
+// Whether a vertex on a bone lies on this part of it: bone that stays is of several.
+bool LiesOn(const Eigen::Vector3d& place, const LabelGrid& bone_of_part) {
+  return NearestVoxel(bone_of_part, place, kSearchVoxels, [](uint8_t is) { return is != 0; })
+      .has_value();
+}
+
+// Takes the constraint from what the surgeon lifts off the bone that each piece was cut from.
+void FreeDissected(const TetMesh& mesh, const LabelGrid& labels, const FreeBands& bands,
+                   uint8_t piece, const std::vector<uint8_t>& touched,
+                   std::vector<uint8_t>* anatomy) {
+  const double dissected_mm = bands.DissectedMm(piece);
+  if (dissected_mm == 0) return;
+  const uint8_t part = PartOf(labels, *bands.parts, piece);
+  LabelGrid staying(labels.geometry);
+  for (size_t i = 0; i < labels.values.size(); ++i) {
+    const uint8_t label = labels.values[i];
+    const bool is_staying = label != kAir && label < piece && bands.parts->values[i] == part;
+    staying.values[i] = is_staying ? 1 : 0;
+  }
+  const FloatGrid distance =
+      DistanceMm(MaskWhere(labels, [piece](uint8_t label) { return label == piece; }));
+  for (size_t v = 0; v < touched.size(); ++v) {
+    if (!IsBone(touched[v]) || touched[v] >= piece) continue;
+    const Eigen::Vector3d place = mesh.positions().row(static_cast<Eigen::Index>(v));
+    const bool is_near = Interpolate(distance, place) < dissected_mm;
+    if (is_near && LiesOn(place, staying)) (*anatomy)[v] = kFree;
+  }
+}
+
 // Takes the constraint from vertices on bone that is too near to bone that moves otherwise.
 void FreeContacts(const TetMesh& mesh, const LabelGrid& labels, size_t num_segments,
-                  const std::vector<uint8_t>& touched, double contact_band_mm,
+                  const std::vector<uint8_t>& touched, const FreeBands& bands,
                   std::vector<uint8_t>* anatomy) {
   for (size_t own = kFixedBone; own < kFirstSegment + num_segments; ++own) {
-    const FloatGrid distance = DistanceFromOtherBone(labels, static_cast<uint8_t>(own));
+    const auto label = static_cast<uint8_t>(own);
+    const FloatGrid distance = DistanceFromContacts(labels, bands, label);
     for (size_t v = 0; v < touched.size(); ++v) {
       if (touched[v] != own) continue;
       const Eigen::Vector3d place = mesh.positions().row(static_cast<Eigen::Index>(v));
-      if (Interpolate(distance, place) < contact_band_mm) (*anatomy)[v] = kFree;
+      if (Interpolate(distance, place) < bands.contact_mm) (*anatomy)[v] = kFree;
     }
+    FreeDissected(mesh, labels, bands, label, touched, anatomy);
   }
-  FreeCutsNearSegments(mesh, labels, touched, kCutBands * contact_band_mm, anatomy);
+  FreeCutsNearSegments(mesh, labels, touched, kCutBands * bands.contact_mm, anatomy);
 }
 
 // Takes the constraints of a tet that would be held by two.
@@ -130,22 +184,23 @@ void FreeSharedTets(const TetMesh& mesh, std::vector<uint8_t>* anatomy) {
 }
 
 absl::Status CheckPresent(const std::vector<uint8_t>& anatomy,
-                          const std::vector<std::string>& segments, double contact_band_mm) {
+                          const std::vector<std::string>& segments, const FreeBands& bands) {
   for (size_t label = kFixed; label < kFirstSegment + segments.size(); ++label) {
     if (std::find(anatomy.begin(), anatomy.end(), label) != anatomy.end()) continue;
     const std::string what =
         label == kFixed ? "the fixed bone and the cuts have"
                         : absl::StrCat("segment ", segments[label - kFirstSegment], " has");
     return absl::InvalidArgumentError(
-        absl::StrCat(what, " no vertices left with a contact band of ", contact_band_mm,
-                     " mm; use a smaller \"contact_band_mm\" or a finer mesh"));
+        absl::StrCat(what, " no vertices left with a contact band of ", bands.contact_mm,
+                     " mm; use a smaller \"contact_band_mm\"",
+                     bands.dissected_mm.empty() ? "" : " or \"dissected_mm\"", " or a finer mesh"));
   }
   return absl::OkStatus();
 }
 
 std::vector<uint8_t> RegionsOfSkin(const TetMesh& mesh, const std::vector<bool>& on_skin,
-                                   const Landmarks& landmarks) {
-  const std::vector<SkinRegion> names = NameSkinRegions(mesh.positions(), landmarks);
+                                   const Landmarks& landmarks, const MouthLine* mouth) {
+  const std::vector<SkinRegion> names = NameSkinRegions(mesh.positions(), landmarks, mouth);
   std::vector<uint8_t> regions(names.size(), 0);
   for (size_t v = 0; v < names.size(); ++v) {
     if (on_skin[v]) regions[v] = static_cast<uint8_t>(names[v]);
@@ -154,6 +209,11 @@ std::vector<uint8_t> RegionsOfSkin(const TetMesh& mesh, const std::vector<bool>&
 }
 
 }  // namespace
+
+double FreeBands::DissectedMm(uint8_t label) const {
+  const size_t s = size_t{label} - kFirstSegment;
+  return label >= kFirstSegment && s < dissected_mm.size() ? dissected_mm[s] : 0;
+}
 
 double LargestMoveMm(const LabelGrid& labels, uint8_t label, const HandlePose& pose) {
   double largest = 0;
@@ -167,7 +227,7 @@ double LargestMoveMm(const LabelGrid& labels, uint8_t label, const HandlePose& p
 absl::StatusOr<PlanningRegions> AssignRegions(const TetMesh& mesh, Eigen::Index boundary_vertices,
                                               const SoftTissue& soft_tissue,
                                               const std::vector<std::string>& segments,
-                                              double contact_band_mm, const Landmarks& landmarks,
+                                              const FreeBands& bands, const Landmarks& landmarks,
                                               const PlanningCt& ct) {
   const auto num_vertices = static_cast<size_t>(mesh.num_vertices());
   const std::vector<uint8_t> touched = TouchedBy(mesh, boundary_vertices, soft_tissue, ct);
@@ -185,12 +245,11 @@ absl::StatusOr<PlanningRegions> AssignRegions(const TetMesh& mesh, Eigen::Index 
                          [](uint8_t label) { return label != kFree; });
   };
   const int64_t before = constrained();
-  FreeContacts(mesh, soft_tissue.labels, segments.size(), touched, contact_band_mm,
-               &regions.anatomy);
+  FreeContacts(mesh, soft_tissue.labels, segments.size(), touched, bands, &regions.anatomy);
   FreeSharedTets(mesh, &regions.anatomy);
   regions.freed_by_contact = before - constrained();
-  TF_RETURN_IF_ERROR(CheckPresent(regions.anatomy, segments, contact_band_mm));
-  regions.skin_region = RegionsOfSkin(mesh, regions.on_skin, landmarks);
+  TF_RETURN_IF_ERROR(CheckPresent(regions.anatomy, segments, bands));
+  regions.skin_region = RegionsOfSkin(mesh, regions.on_skin, landmarks, ct.mouth);
   return regions;
 }
 

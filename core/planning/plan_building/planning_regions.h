@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 
 #include "core/imaging/anatomy/landmarks.h"
+#include "core/imaging/anatomy/mouth_line.h"
 #include "core/imaging/anatomy/soft_tissue.h"
 #include "core/mechanics/constraints/handle_pose.h"
 #include "core/mesh/tet_mesh.h"
@@ -21,7 +22,20 @@ namespace tissueform {
 struct PlanningCt {
   const HuGrid& hu;
   double tissue_above_hu = 0;
-  const LabelGrid* cut = nullptr;  // HeadSegmentation::cut; null or without voxels: none
+  const LabelGrid* cut = nullptr;    // HeadSegmentation::cut; null or without voxels: none
+  const MouthLine* mouth = nullptr;  // where the regions of the lips meet; null: NameSkinRegions
+};
+
+// Where bone holds no tissue, so that none is torn.
+struct FreeBands {
+  double contact_mm = 0;  // from bone that moves otherwise (teeth, the walls of a cut, a joint)
+  // Of each segment how far from its cut the surgeon lifts tissue off the bone that stays: it is
+  // free there, and the piece keeps its tissue up to the cut. 0: the cut is as any other contact.
+  std::vector<double> dissected_mm = {};  // #segments, or empty: all 0
+  const LabelGrid* parts = nullptr;       // BoneParts::labels, on the grid of the soft tissue's
+                                          // labels; not owned; needed where dissected_mm is not 0
+
+  double DissectedMm(uint8_t label) const;  // of the segment of that label; 0 of bone that stays
 };
 
 // What every vertex of a planning mesh is. Numbers of `anatomy`: 0 free, 1 fixed (bone that stays,
@@ -44,17 +58,16 @@ double LargestMoveMm(const LabelGrid& labels, uint8_t label, const HandlePose& p
 //
 // Where the scanner's circle cuts the head, a vertex is free, but no skin.
 //
-// Bone nearer than `contact_band_mm` to bone that moves otherwise (teeth, the walls of a cut, a
-// joint) is left free on both sides, so that tissue between them is not torn; and so are the
-// vertices of tets that two different constraints would hold all the same. Cuts nearer than three
-// times that to a segment are left free, too: they are no anatomy, and would hold the skin.
+// Bone is left free as `bands` say, and so are the vertices of tets that two different constraints
+// would hold all the same. Cuts nearer than three contact bands to a segment are left free, too:
+// they are no anatomy, and would hold the skin.
 //
 // `boundary_vertices` is the number of vertices of the mesh on its boundary, which come first.
-// Errors: InvalidArgument when the band leaves a segment or the fixed bone without vertices.
+// Errors: InvalidArgument when the bands leave a segment or the fixed bone without vertices.
 absl::StatusOr<PlanningRegions> AssignRegions(const TetMesh& mesh, Eigen::Index boundary_vertices,
                                               const SoftTissue& soft_tissue,
                                               const std::vector<std::string>& segments,
-                                              double contact_band_mm, const Landmarks& landmarks,
+                                              const FreeBands& bands, const Landmarks& landmarks,
                                               const PlanningCt& ct);
 
 }  // namespace tissueform

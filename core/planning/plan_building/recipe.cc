@@ -19,6 +19,7 @@
 #include "core/mesh/payload/sha256.h"
 #include "core/planning/json_values.h"
 #include "core/planning/model_names.h"
+#include "core/planning/plan_building/recipe_markups.h"
 
 namespace tissueform {
 namespace {
@@ -49,8 +50,21 @@ absl::Status ReadPlane(const Json& json, const char* key, const std::string& whe
   return absl::OkStatus();
 }
 
+void ReadValues(const Json& json, CtReadOptions* options) {
+  const std::string values = json.value("values", "auto");
+  options->values = values == "hu"     ? CtValues::kHu
+                    : values == "gray" ? CtValues::kGray
+                                       : CtValues::kAuto;
+  const auto threshold = [&json](const char* key, std::optional<double>& gray) {
+    if (json.contains(key)) gray = json.at(key).get<double>();
+  };
+  threshold("tissue_above_gray", options->tissue_above_gray);
+  threshold("bone_above_gray", options->bone_above_gray);
+}
+
 CtReadOptions ToCtOptions(const Json& json) {
   CtReadOptions options;
+  ReadValues(json, &options);
   if (json.contains("hu_offset")) options.hu_offset = json.at("hu_offset").get<double>();
   options.axes = json.value("axes", "");
   if (json.contains("series_number")) options.series_number = json.at("series_number").get<int>();
@@ -61,9 +75,10 @@ CtReadOptions ToCtOptions(const Json& json) {
   return options;
 }
 
-absl::StatusOr<RecipeLabels> ToLabels(const Json& json) {
+absl::StatusOr<RecipeLabels> ToLabels(const Json& json, const std::string& folder) {
   RecipeLabels labels;
   labels.file = json.value("file", "");
+  if (!labels.file.empty()) labels.file = (std::filesystem::path(folder) / labels.file).string();
   labels.convention = json.value("convention", "");
   const Json all_names = json.value("names", Json::object());
   for (const auto& [key, names] : all_names.items()) {
@@ -108,24 +123,44 @@ OsteotomyKind ToKind(const std::string& name) {
   return OsteotomyKind::kGenioplasty;
 }
 
-absl::StatusOr<RecipeSegment> ToSegment(const Json& json, const std::string& where) {
+// Where the piece and its movement come from, if not from osteotomy, planes and pose.
+absl::Status ReadSegmentSources(const Json& json, const std::string& where,
+                                const std::string& folder, RecipeSegment* segment) {
+  if (!json.contains("osteotomy") && !json.contains("surface")) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the segment at ", where, " has no \"osteotomy\" and no \"surface\"; give one of them"));
+  }
+  if (json.contains("surface") && json.contains("planes")) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("\"planes\" at ", where, " has no use beside \"surface\""));
+  }
+  if (json.contains("surface")) segment->surface = SurfaceFromJson(json.at("surface"), folder);
+  TF_ASSIGN_OR_RETURN(segment->move, MoveSourceFromJson(json, where, folder));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<RecipeSegment> ToSegment(const Json& json, const std::string& where,
+                                        const std::string& folder) {
   RecipeSegment segment;
   segment.name = json.at("name");
-  segment.kind = ToKind(json.at("osteotomy"));
+  TF_RETURN_IF_ERROR(ReadSegmentSources(json, where, folder, &segment));
+  segment.kind_given = json.contains("osteotomy");
+  segment.kind = ToKind(json.value("osteotomy", "bssro"));
   const Json planes = json.value("planes", Json::array());
   for (size_t i = 0; i < planes.size(); ++i) {
     TF_ASSIGN_OR_RETURN(Plane plane, ToPlane(planes[i], absl::StrCat(where, "/planes/", i)));
     segment.planes.push_back(std::move(plane));
   }
   segment.pose = PoseFromJson(json.value("pose", Json::object()));
+  segment.dissected_mm = json.value("dissected_mm", segment.dissected_mm);
   return segment;
 }
 
-absl::Status ReadSegments(const Json& json, Recipe* recipe) {
+absl::Status ReadSegments(const Json& json, const std::string& folder, Recipe* recipe) {
   std::set<std::string> names;
   for (size_t i = 0; i < json.size(); ++i) {
     const std::string where = absl::StrCat("/segments/", i);
-    TF_ASSIGN_OR_RETURN(RecipeSegment segment, ToSegment(json[i], where));
+    TF_ASSIGN_OR_RETURN(RecipeSegment segment, ToSegment(json[i], where, folder));
     if (!names.insert(segment.name).second) {
       return absl::InvalidArgumentError(
           absl::StrCat("two segments are named \"", segment.name, "\" (", where, "/name)"));
@@ -194,16 +229,25 @@ absl::Status ReadHeadFrame(const Json& json, Recipe* recipe) {
   return ReadPlane(json, "horizontal", "/head_frame", &recipe->horizontal);
 }
 
-absl::StatusOr<Recipe> ToRecipe(const Json& json) {
+GivenLandmarks ToLandmarks(const Json& json) {
+  GivenLandmarks landmarks;
+  const Json points = json.value("points_mm", Json::object());
+  for (const auto& [name, place] : points.items()) landmarks[name] = VectorFromJson(place);
+  return landmarks;
+}
+
+absl::StatusOr<Recipe> ToRecipe(const Json& json, const std::string& folder) {
   const Json nothing = Json::object();
   Recipe recipe;
   recipe.ct = ToCtOptions(json.value("ct", nothing));
-  TF_ASSIGN_OR_RETURN(recipe.labels, ToLabels(json.value("labels", nothing)));
+  TF_ASSIGN_OR_RETURN(recipe.labels, ToLabels(json.value("labels", nothing), folder));
   recipe.spacing_mm = json.value("spacing_mm", recipe.spacing_mm);
   recipe.metal = ToMetal(json.value("metal", Json("auto")));
   recipe.segmentation = ToSegmentation(json.value("segmentation", nothing));
   TF_RETURN_IF_ERROR(ReadPlane(json, "occlusal_plane", "", &recipe.occlusal_plane));
-  TF_RETURN_IF_ERROR(ReadSegments(json.at("segments"), &recipe));
+  TF_RETURN_IF_ERROR(ReadSegments(json.at("segments"), folder, &recipe));
+  TF_ASSIGN_OR_RETURN(recipe.surface_axes, SurfaceAxesFromJson(json.value("surfaces", nothing)));
+  recipe.landmarks = ToLandmarks(json.value("landmarks", nothing));
   TF_RETURN_IF_ERROR(ReadRegionOfInterest(json.value("region_of_interest", nothing), &recipe));
   TF_RETURN_IF_ERROR(ReadHeadFrame(json.value("head_frame", nothing), &recipe));
   recipe.soft_tissue = ToSoftTissue(json.value("soft_tissue", nothing));
@@ -220,11 +264,13 @@ absl::StatusOr<Recipe> ToRecipe(const Json& json) {
   return recipe;
 }
 
-absl::StatusOr<Recipe> ParseUnnamed(const std::string& text) {
-  TF_ASSIGN_OR_RETURN(const Json json, ParseJsonStrictly(text));
+absl::StatusOr<Recipe> ParseUnnamed(const std::string& text,
+                                    const std::optional<std::string>& folder) {
+  TF_ASSIGN_OR_RETURN(Json json, ParseJsonStrictly(text));
   TF_RETURN_IF_ERROR(RecipeSchema().Check(json));
   try {
-    return ToRecipe(json);
+    TF_RETURN_IF_ERROR(InsertMarkups(folder, &json));
+    return ToRecipe(json, folder.value_or(""));
   } catch (const std::exception& exception) {
     return absl::InvalidArgumentError(absl::StrCat("cannot be read: ", exception.what()));
   }
@@ -242,6 +288,11 @@ Json CtToJson(const CtReadOptions& options) {
   if (options.join_series != JoinSeries::kAuto) {
     json["join_series"] = options.join_series == JoinSeries::kAlways ? "always" : "never";
   }
+  if (options.values != CtValues::kAuto) {
+    json["values"] = options.values == CtValues::kHu ? "hu" : "gray";
+  }
+  if (options.tissue_above_gray) json["tissue_above_gray"] = *options.tissue_above_gray;
+  if (options.bone_above_gray) json["bone_above_gray"] = *options.bone_above_gray;
   return json;
 }
 
@@ -269,6 +320,9 @@ Json SegmentToJson(const RecipeSegment& segment) {
                {"osteotomy", std::string(OsteotomyKindName(segment.kind))},
                {"pose", ToJson(segment.pose)}};
   for (const Plane& plane : segment.planes) json["planes"].push_back(PlaneToJson(plane));
+  if (segment.dissected_mm > 0) json["dissected_mm"] = segment.dissected_mm;
+  // Its own name may hold a patient's; the plan's folder has the piece under this one.
+  if (segment.surface) json["surface"]["file"] = absl::StrCat("segments/", segment.name, ".stl");
   return json;
 }
 
@@ -300,14 +354,12 @@ absl::StatusOr<Recipe> ReadRecipe(const std::string& path) {
     return absl::PermissionDeniedError(
         absl::StrCat("cannot read recipe ", path, "; check its permissions"));
   }
-  TF_ASSIGN_OR_RETURN(Recipe recipe, ParseRecipe(text, path));
-  std::string& labels = recipe.labels.file;
-  if (!labels.empty()) labels = (std::filesystem::path(path).parent_path() / labels).string();
-  return recipe;
+  return ParseRecipe(text, path, std::filesystem::path(path).parent_path().string());
 }
 
-absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name) {
-  absl::StatusOr<Recipe> recipe = ParseUnnamed(std::string(json));
+absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name,
+                                   const std::optional<std::string>& folder) {
+  absl::StatusOr<Recipe> recipe = ParseUnnamed(std::string(json), folder);
   if (recipe.ok()) {
     recipe->sha256 = Sha256Hex({{json.data(), json.size()}});
     return recipe;
@@ -352,6 +404,9 @@ std::string RecipeToJson(const Recipe& recipe) {
   add_plane(json["head_frame"], "horizontal", recipe.horizontal);
   if (json["head_frame"].is_null()) json.erase("head_frame");
   if (recipe.contact_band_mm) json["contact_band_mm"] = *recipe.contact_band_mm;
+  for (const auto& [name, place] : recipe.landmarks) {
+    json["landmarks"]["points_mm"][name] = ToJson(place);
+  }
   // Only where it is not the default, so that a recipe of version 1 stays one.
   if (!recipe.labels.file.empty()) json["labels"] = LabelsToJson(recipe.labels);
   if (!recipe.metal.correct) json["metal"] = "off";

@@ -20,6 +20,9 @@
 #include "core/imaging/metal/metal_reduction.h"
 #include "core/mechanics/constraints/handle_pose.h"
 #include "core/mechanics/deformation/model.h"
+#include "core/planning/plan_building/given_landmarks.h"
+#include "core/planning/plan_building/segment_files.h"
+#include "core/planning/plan_building/surface_source.h"
 
 namespace tissueform {
 
@@ -29,6 +32,11 @@ struct RecipeSegment {
   OsteotomyKind kind = OsteotomyKind::kBssro;
   std::vector<Plane> planes;  // empty: from the anatomy
   HandlePose pose;            // LPS, radians and mm
+  // The piece itself, in place of an osteotomy: all segments have one, or none has.
+  std::optional<SurfaceSource> surface = {};
+  bool kind_given = true;   // otherwise the CT shows to which jaw the surface belongs
+  MoveSource move = {};     // what the pose is to be read from (given_pieces.h)
+  double dissected_mm = 0;  // FreeBands::dissected_mm
 };
 
 struct RecipeMesh {
@@ -63,7 +71,9 @@ struct Recipe {
   HeadSegmentationOptions segmentation;
   std::optional<Plane> occlusal_plane;
   std::vector<RecipeSegment> segments;  // at least one
-  std::optional<Plane> back;            // of the region of interest
+  SurfaceAxes surface_axes;             // of the segments' surfaces
+  GivenLandmarks landmarks;
+  std::optional<Plane> back;  // of the region of interest
   std::optional<Plane> above;
   std::optional<Plane> below;
   std::optional<Plane> midsagittal;  // of the head frame
@@ -86,13 +96,17 @@ inline constexpr size_t kMaxRecipeBytes = size_t{1} << 20;
 // Reads and checks a recipe against the published schema, docs/recipe.schema.json, which is built
 // into the program, in the version that the file says.
 //
+// Reads markups files that it names; label maps, surfaces and transforms are left to BuildPlan.
+//
 // Errors: NotFound (no such file), InvalidArgument (not JSON, unknown key, wrong type, value out of
 // range, two segments of one name, a normal of length 0, tissues out of order; the message names
-// the key as a JSON pointer).
+// the key as a JSON pointer); those of InsertMarkups.
 absl::StatusOr<Recipe> ReadRecipe(const std::string& path);
 
-// The same for a text, whose SHA-256 it keeps; `name` stands for the file in messages.
-absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name);
+// The same for a text, whose SHA-256 it keeps; `name` stands for the file in messages. Files that
+// the text names are files of `folder`; without a folder it must not name any.
+absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name,
+                                   const std::optional<std::string>& folder = std::nullopt);
 
 // The recipe with everything that was left out filled in: what report.json tells.
 std::string RecipeToJson(const Recipe& recipe);

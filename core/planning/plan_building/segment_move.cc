@@ -17,19 +17,18 @@
 #include "absl/strings/strip.h"
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
 #include "core/base/status_macros.h"
-#include "core/mesh/generation/surface_distance.h"
+#include "core/mesh/generation/rigid_registration.h"
 
 namespace tissueform {
 namespace {
 
 constexpr double kLargestStretch = 1e-3;
 constexpr double kLargestRmsMm = 1.5;
+constexpr double kLargestShiftMm = 1e6;
 constexpr Eigen::Index kFitPoints = 3000;
 constexpr int kMaxFitRounds = 200;
-constexpr double kRestMm = 1e-5;
 
 // What the file says of one transform: kind, parameters, center.
 struct ItkText {
@@ -118,61 +117,19 @@ absl::Status CheckRigid(const Eigen::Matrix3d& matrix) {
       50 * stretch));
 }
 
-// The rotation nearest to a matrix.
-Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-  signs[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
-}
-
-// The best rigid movement of points onto points, row by row (Kabsch 1976).
-RigidMove MoveOnto(const Positions& from, const Positions& to) {
-  const Eigen::RowVector3d from_center = from.colwise().mean();
-  const Eigen::RowVector3d to_center = to.colwise().mean();
-  const Eigen::Matrix3d spread =
-      (to.rowwise() - to_center).transpose() * (from.rowwise() - from_center);
-  RigidMove move;
-  move.rotation = NearestRotation(spread);
-  move.translation_mm = to_center.transpose() - move.rotation * from_center.transpose();
-  return move;
-}
-
-Positions Moved(const Positions& points, const RigidMove& move) {
-  return (points * move.rotation.transpose()).rowwise() + move.translation_mm.transpose();
-}
-
 double RmsOf(const Positions& a, const Positions& b) {
   return std::sqrt((a - b).rowwise().squaredNorm().mean());
 }
 
-// Centroids of triangles, spread evenly over their numbers.
-Positions Sample(const TriangleMesh& mesh) {
-  const Eigen::Index count = std::min(kFitPoints, mesh.num_triangles());
-  Positions points(count, 3);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const auto t = mesh.triangles().row(i * mesh.num_triangles() / count);
-    points.row(i) =
-        (mesh.positions().row(t[0]) + mesh.positions().row(t[1]) + mesh.positions().row(t[2])) / 3;
-  }
-  return points;
-}
-
 RigidFit FitByNearest(const TriangleMesh& from, const TriangleMesh& to) {
-  const NearestPoints nearest(to);
-  const Positions points = Sample(from);
-  RigidFit fit;
-  fit.move.translation_mm = (Sample(to).colwise().mean() - points.colwise().mean()).transpose();
-  fit.rms_mm = INFINITY;
-  for (int round = 0; round < kMaxFitRounds; ++round) {
-    const Positions targets = nearest.Of(Moved(points, fit.move));
-    fit.move = MoveOnto(points, targets);
-    const double rms_mm = RmsOf(Moved(points, fit.move), targets);
-    const bool rests = fit.rms_mm - rms_mm < kRestMm;
-    fit.rms_mm = rms_mm;
-    if (rests) break;
-  }
-  return fit;
+  const OrientedPoints points = SampleTriangles(from, kFitPoints);
+  RigidMove start;
+  start.translation_mm =
+      (SampleTriangles(to, kFitPoints).points.colwise().mean() - points.points.colwise().mean())
+          .transpose();
+  const Registration found = SurfaceRegistration(to).Refine(
+      points, start, {.compare_normals = false, .max_rounds = kMaxFitRounds});
+  return {.move = found.move, .rms_mm = found.all_rms_mm};
 }
 
 }  // namespace
@@ -193,13 +150,17 @@ absl::StatusOr<RigidMove> ParseItkTransform(const std::string& text) {
                               itk.parameters.end()[-1]);
   const Eigen::Matrix3d rotation = NearestRotation(*matrix);
   const Eigen::Vector3d offset = center + shift - rotation * center;
-  return RigidMove{rotation.transpose(), -(rotation.transpose() * offset)};
+  if (!(offset.cwiseAbs().maxCoeff() <= kLargestShiftMm)) {
+    return absl::InvalidArgumentError("the transform moves by more than 1e6 mm; are its units mm?");
+  }
+  return Inverse({rotation, offset});
 }
 
 absl::StatusOr<RigidFit> FitRigidly(const TriangleMesh& from, const TriangleMesh& to) {
   RigidFit fit;
   if (from.num_vertices() == to.num_vertices() && from.triangles() == to.triangles()) {
-    fit.move = MoveOnto(from.positions(), to.positions());
+    fit.move =
+        MoveOnto(from.positions(), to.positions(), Eigen::VectorXd::Ones(from.num_vertices()));
     fit.rms_mm = RmsOf(Moved(from.positions(), fit.move), to.positions());
   } else {
     fit = FitByNearest(from, to);
@@ -210,15 +171,6 @@ absl::StatusOr<RigidFit> FitRigidly(const TriangleMesh& from, const TriangleMesh
       "%g "
       "mm: they are not the same piece, or one is in another place; give the pose as numbers",
       fit.rms_mm, kLargestRmsMm));
-}
-
-HandlePose PoseOf(const RigidMove& move, const Eigen::Vector3d& pivot_mm) {
-  const Eigen::AngleAxisd turn(move.rotation);
-  HandlePose pose;
-  pose.rotation_vector = turn.angle() * turn.axis();
-  pose.pivot_mm = pivot_mm;
-  pose.translation_mm = move.rotation * pivot_mm + move.translation_mm - pivot_mm;
-  return pose;
 }
 
 std::string MoveText(const HandlePose& pose) {

@@ -7,16 +7,10 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/constraints/rigid_pose.h"
 #include "core/mesh/triangle_mesh.h"
 
 namespace tissueform {
-
-// x -> rotation x + translation_mm, LPS, mm.
-struct RigidMove {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
-};
 
 // The movement that a text file of ITK transforms (.tfm, .txt) describes. Such files map points of
 // the image after the movement to the image before it, as resampling needs them: the movement is
@@ -39,9 +33,6 @@ struct RigidFit {
 //
 // Errors: InvalidArgument when the fit leaves more than 1.5 mm RMS: these are different pieces.
 absl::StatusOr<RigidFit> FitRigidly(const TriangleMesh& from, const TriangleMesh& to);
-
-// The movement as the pose of a handle about a pivot.
-HandlePose PoseOf(const RigidMove& move, const Eigen::Vector3d& pivot_mm);
 
 // "moves 6.0 mm backward, 0.5 mm up, 0.0 mm left, and turns by 1.2 degrees", at the pivot.
 std::string MoveText(const HandlePose& pose);

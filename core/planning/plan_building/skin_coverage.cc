@@ -253,7 +253,7 @@ absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,
   TF_ASSIGN_OR_RETURN(const TriangleMesh mesh_skin, SkinOf(mesh));
   const TriangleSizes sizes = SizesOf(skin);
   const Eigen::VectorXd distances = DistancesToSurface(sizes.middles, mesh_skin, threads);
-  const std::vector<SkinRegion> names = NameSkinRegions(sizes.middles, landmarks);
+  const std::vector<SkinRegion> names = NameSkinRegions(sizes.middles, landmarks, mesh.mouth);
 
   SkinCoverage coverage;
   coverage.tolerance_mm = tolerance_mm;

@@ -85,12 +85,13 @@ struct MeshedSkin {
   const TriangleMesh& surface;
   const PlanningRegions& regions;
   const RegionOfInterest& region;
-  const LabelGrid* outside_air = nullptr;  // OutsideAir(head); null: found anew
+  const LabelGrid* outside_air = nullptr;  // OutsideAir(head); null: it is found here
+  const MouthLine* mouth = nullptr;        // as in PlanningCt
 };
 
 // Within a voxel of the planes of the region of interest, and of HeadSegmentation::cut, nothing is
-// counted. `ct_voxel_mm` is the
-// longest side of a voxel of the CT as it was read. The result does not depend on `threads`.
+// counted. `ct_voxel_mm` is the longest side of a voxel of the CT as it was read. The result does
+// not depend on `threads`.
 //
 // Errors: those of ExtractSurface; InvalidArgument when no outer skin lies in the region.
 absl::StatusOr<SkinCoverage> MeasureSkinCoverage(const HeadSegmentation& head,

@@ -9,11 +9,21 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
 #include "core/base/parallel_for.h"
+#include "core/base/status_macros.h"
 #include "core/mesh/generation/surface_distance.h"
 
 namespace tissueform {
 namespace {
+
+// Bones from one image share the voxels of their border.
+constexpr double kLargestOverlapFraction = 0.05;
+constexpr char kTurnAdvice[] =
+    "its triangles face inward or the surface is mirrored; turn the triangles (\"flip\": true) if "
+    "the coordinates are right";
 
 constexpr int kAgreeingRays = 4;
 constexpr double kBorderVoxels = 2;
@@ -150,6 +160,42 @@ SolidVoxels FindSolidVoxels(const TriangleMesh& surface, const GridGeometry& geo
                                     [](int8_t vote) { return vote <= -kAgreeingRays; });
   solid.turned_mm3 = static_cast<double>(turned) * VoxelVolumeMm3(geometry);
   return solid;
+}
+
+absl::StatusOr<LabelGrid> SolidOf(const TriangleMesh& mesh, const std::string& what,
+                                  const GridGeometry& geometry, int threads, const OpenBox& open) {
+  SolidVoxels solid = FindSolidVoxels(mesh, geometry, threads, open);
+  if (solid.turned_mm3 > solid.inside_mm3) {
+    return absl::InvalidArgumentError(absl::StrCat(what, " is inside out: ", kTurnAdvice));
+  }
+  constexpr double kSmallestSolidMm3 = 100;
+  if (solid.inside_mm3 < kSmallestSolidMm3) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%s encloses %.0f mm3 of the head: it is open, in another place or in another "
+        "unit; close it, or have it wrapped (\"wrap_mm\")",
+        what, solid.inside_mm3));
+  }
+  return std::move(solid.inside);
+}
+
+absl::Status MarkSolid(const LabelGrid& inside, const std::string& what, uint8_t label,
+                       LabelGrid* labels) {
+  int64_t shared = 0;
+  int64_t all = 0;
+  for (size_t i = 0; i < inside.values.size(); ++i) {
+    if (inside.values[i] == 0) continue;
+    ++all;
+    if (labels->values[i] != 0) ++shared;
+    if (labels->values[i] == 0) labels->values[i] = label;
+  }
+  if (static_cast<double>(shared) <= kLargestOverlapFraction * static_cast<double>(all)) {
+    return absl::OkStatus();
+  }
+  const double cm3 = VoxelVolumeMm3(labels->geometry) / 1000;
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "%s overlaps with the bones given before it in %.1f cm3 of its %.1f cm3: each piece must "
+      "be given once",
+      what, static_cast<double>(shared) * cm3, static_cast<double>(all) * cm3));
 }
 
 FloatGrid DistancesNearBorder(const LabelGrid& inside, const TriangleMesh& surface, int threads) {

@@ -4,7 +4,10 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <string>
 
+#include "absl/status/statusor.h"
 #include <Eigen/Geometry>
 
 #include "core/imaging/anatomy/grid_operations.h"
@@ -36,6 +39,19 @@ struct SolidVoxels {
 // Does not depend on `threads`.
 SolidVoxels FindSolidVoxels(const TriangleMesh& surface, const GridGeometry& geometry, int threads,
                             const OpenBox& open = {});
+
+// The voxels inside a surface of a whole bone or of the skin, which messages call `what`.
+//
+// Errors: InvalidArgument when the surface faces inward or encloses less than 100 mm3.
+absl::StatusOr<LabelGrid> SolidOf(const TriangleMesh& mesh, const std::string& what,
+                                  const GridGeometry& geometry, int threads,
+                                  const OpenBox& open = {});
+
+// Gives the voxels of `inside` a label. Voxels that have one keep it.
+//
+// Errors: InvalidArgument when more than 5 % of them have one.
+absl::Status MarkSolid(const LabelGrid& inside, const std::string& what, uint8_t label,
+                       LabelGrid* labels);
 
 // Distances from the voxels' centers to the surface in mm, positive inside, exact within two voxels
 // of the border of `inside` and limited to +- two voxels elsewhere.

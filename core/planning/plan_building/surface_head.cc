@@ -33,14 +33,8 @@ constexpr double kSmallestSkinMm = 80;
 constexpr double kLargestSkinMm = 600;
 // Bone outside the skin: skin and teeth that touch differ by the surfaces' own errors.
 constexpr double kLargestOutsideFraction = 0.03;
-// Bones from one image share the voxels of their border.
-constexpr double kLargestOverlapFraction = 0.05;
 // Rami lie behind the body of a jaw by 20 to 40 mm.
 constexpr double kRamusInFrontMm = 5;
-
-constexpr char kTurnAdvice[] =
-    "its triangles face inward or the surface is mirrored; turn the triangles (\"flip\": true) if "
-    "the coordinates are right";
 
 absl::Status CheckSkinSize(const Eigen::AlignedBox3d& box) {
   const double size_mm = box.sizes().maxCoeff();
@@ -64,24 +58,6 @@ GridGeometry GridAround(const Eigen::AlignedBox3d& box, double spacing_mm) {
         static_cast<int>(std::ceil(box.sizes()[axis] / spacing_mm)) + 2 * kMarginVoxels + 1;
   }
   return geometry;
-}
-
-// The voxels inside a surface of a whole bone or of the skin.
-absl::StatusOr<LabelGrid> SolidOf(const TriangleMesh& mesh, const std::string& what,
-                                  const GridGeometry& geometry, int threads,
-                                  const OpenBox& open = {}) {
-  SolidVoxels solid = FindSolidVoxels(mesh, geometry, threads, open);
-  if (solid.turned_mm3 > solid.inside_mm3) {
-    return absl::InvalidArgumentError(absl::StrCat(what, " is inside out: ", kTurnAdvice));
-  }
-  constexpr double kSmallestSolidMm3 = 100;
-  if (solid.inside_mm3 < kSmallestSolidMm3) {
-    return absl::InvalidArgumentError(absl::StrFormat(
-        "%s encloses %.0f mm3 inside the skin's box: it is open, in another place or in another "
-        "unit; close it, or have it wrapped (\"wrap_mm\")",
-        what, solid.inside_mm3));
-  }
-  return std::move(solid.inside);
 }
 
 double HuAt(double to_skin_voxels, double to_bone_voxels) {
@@ -132,25 +108,10 @@ class HeadMaker {
     return absl::OkStatus();
   }
 
-  // Gives the voxels inside a bone its label. Those that an earlier one has stay its own.
   absl::Status AddBone(const TriangleMesh& mesh, const std::string& what, uint8_t label,
                        LabelGrid* labels) {
     TF_ASSIGN_OR_RETURN(LabelGrid inside, SolidOf(mesh, what, labels->geometry, threads_));
-    int64_t shared = 0;
-    int64_t all = 0;
-    for (size_t i = 0; i < inside.values.size(); ++i) {
-      if (inside.values[i] == 0) continue;
-      ++all;
-      if (labels->values[i] != 0) ++shared;
-      if (labels->values[i] == 0) labels->values[i] = label;
-    }
-    if (static_cast<double>(shared) > kLargestOverlapFraction * static_cast<double>(all)) {
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "%s overlaps with the bones given before it in %.1f cm3 of its %.1f cm3: each piece must "
-          "be given once",
-          what, static_cast<double>(shared) * VoxelVolumeMm3(labels->geometry) / 1000,
-          static_cast<double>(all) * VoxelVolumeMm3(labels->geometry) / 1000));
-    }
+    TF_RETURN_IF_ERROR(MarkSolid(inside, what, label, labels));
     bones_.push_back({&mesh, std::move(inside)});
     return absl::OkStatus();
   }

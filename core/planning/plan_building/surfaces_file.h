@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
@@ -20,6 +21,7 @@ struct SurfacesInput {
   // Format "surfaces"; the digest is that of the surfaces file and of all files that it names. The
   // notes state which units and axes were given and which were assumed.
   CtProvenance provenance;
+  std::vector<std::string> roles;  // "skin", "skull", "lower jaw", ... of the files
 };
 
 // The JSON schema of the format.

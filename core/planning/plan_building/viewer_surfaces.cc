@@ -15,6 +15,7 @@
 #include "core/imaging/anatomy/grid_operations.h"
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/imaging/anatomy/osteotomy.h"
+#include "core/imaging/anatomy/outer_skin.h"
 #include "core/imaging/anatomy/surface_extraction.h"
 #include "core/mesh/generation/surface_decimation.h"
 #include "core/planning/plan_building/crown_finder.h"
@@ -80,19 +81,19 @@ std::vector<std::optional<TriangleMesh>> Split(const TriangleMesh& surface, size
 
 // Inner air counts as tissue: the outer skin is one closed surface, without sinuses and airway.
 // Clamped, so that bone under thin skin does not draw the surface outward.
-absl::StatusOr<TriangleMesh> SkinSurface(const ViewerSources& sources) {
-  const HeadSegmentation& head = sources.head;
+absl::StatusOr<TriangleMesh> SkinSurface(const HeadSegmentation& head, const LabelGrid& outside_air,
+                                         double ct_voxel_mm) {
   constexpr float kAirHu = -1000;
   const auto level = static_cast<float>(head.options.tissue_above_hu);
   FloatGrid hu(head.hu.geometry);
   for (size_t i = 0; i < hu.values.size(); ++i) {
-    const bool is_inner_air = head.hu.values[i] <= level && sources.outside_air.values[i] == 0;
+    const bool is_inner_air = head.hu.values[i] <= level && outside_air.values[i] == 0;
     hu.values[i] = is_inner_air ? 2 * level - kAirHu
                                 : std::clamp(static_cast<float>(head.hu.values[i]), kAirHu,
                                              2 * level - kAirHu);
   }
   const double smooth_mm = std::max(kSmoothVoxels * hu.geometry.spacing_mm,
-                                    std::min(kMaxSmoothMm, kSmoothCtVoxels * sources.ct_voxel_mm));
+                                    std::min(kMaxSmoothMm, kSmoothCtVoxels * ct_voxel_mm));
   return ExtractSurface(GaussianSmooth(hu, smooth_mm),
                         {.level = level,
                          .clearance = 20,
@@ -149,13 +150,22 @@ bool IsAtEnd(const Vector3d& place, const GridGeometry& geometry) {
   return false;
 }
 
-absl::Status AddSkin(const ViewerSources& sources, std::vector<CaseSurface>* surfaces) {
-  TF_ASSIGN_OR_RETURN(const TriangleMesh fine, SkinSurface(sources));
+// The skin, and what ends it where the CT does.
+absl::StatusOr<std::vector<std::optional<TriangleMesh>>> SkinAndEnd(const HeadSegmentation& head,
+                                                                    const LabelGrid& outside_air,
+                                                                    double ct_voxel_mm) {
+  TF_ASSIGN_OR_RETURN(const TriangleMesh fine, SkinSurface(head, outside_air, ct_voxel_mm));
   TF_ASSIGN_OR_RETURN(const TriangleMesh skin, DecimateSurface(fine, kSkinTriangles));
-  const auto split = Split(skin, 2, [&](const Vector3d& middle) -> size_t {
-    return IsAtEnd(middle, sources.head.hu.geometry) ? 1 : 0;
+  auto split = Split(skin, 2, [&](const Vector3d& middle) -> size_t {
+    return IsAtEnd(middle, head.hu.geometry) ? 1 : 0;
   });
   if (!split[0]) return absl::InvalidArgumentError("the CT does not show the head's skin");
+  return split;
+}
+
+absl::Status AddSkin(const ViewerSources& sources, std::vector<CaseSurface>* surfaces) {
+  TF_ASSIGN_OR_RETURN(const auto split,
+                      SkinAndEnd(sources.head, sources.outside_air, sources.ct_voxel_mm));
   surfaces->push_back(ToCaseSurface("skin", SurfaceKind::kSkin, "", *split[0]));
   if (split[1]) {
     surfaces->push_back(ToCaseSurface("end of the CT", SurfaceKind::kSkin, "", *split[1]));
@@ -206,6 +216,14 @@ absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources&
     AddBone(bone, b == 0 ? "" : sources.segments[b - 1], crowns, &surfaces);
   }
   return surfaces;
+}
+
+absl::StatusOr<HeadShells> MakeHeadShells(const HeadSegmentation& head, double ct_voxel_mm) {
+  TF_ASSIGN_OR_RETURN(const auto split, SkinAndEnd(head, OutsideAir(head), ct_voxel_mm));
+  const LabelGrid bone = MaskWhere(head.bone, [](uint8_t value) { return value != 0; });
+  TF_ASSIGN_OR_RETURN(const TriangleMesh fine, BoneSurface(head, bone, 1));
+  TF_ASSIGN_OR_RETURN(TriangleMesh decimated, DecimateSurface(fine, kBoneTriangles));
+  return HeadShells{.skin = *split[0], .bone = std::move(decimated)};
 }
 
 }  // namespace tissueform

@@ -11,6 +11,7 @@
 #include "core/imaging/anatomy/head_segmentation.h"
 #include "core/imaging/anatomy/landmarks.h"
 #include "core/imaging/ct/voxel_grid.h"
+#include "core/mesh/triangle_mesh.h"
 #include "core/planning/case_file/case_file.h"
 
 namespace tissueform {
@@ -37,5 +38,15 @@ struct ViewerSources {
 // The first is the skin. Errors: those of ExtractSurface and DecimateSurface; InvalidArgument when
 // there is no skin.
 absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources& sources);
+
+// Skin and bone of a head whose jaws are not told apart: all that a scan shows. The skin is open
+// where the CT ends.
+struct HeadShells {
+  TriangleMesh skin;
+  TriangleMesh bone;
+};
+
+// Of the segmented head, with as many triangles as above. Errors: those of MakeViewerSurfaces.
+absl::StatusOr<HeadShells> MakeHeadShells(const HeadSegmentation& head, double ct_voxel_mm);
 
 }  // namespace tissueform

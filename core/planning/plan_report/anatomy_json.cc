@@ -68,6 +68,7 @@ Json BoneJson(const PlanBuild& build, const PlanMeasures& measures) {
     bone["occlusal_plane"] = PlaneJson(*build.parts.occlusal_plane);
     bone["occlusal_clearance"] = build.parts.occlusal_clearance;
   }
+  if (build.parts.separation == JawSeparation::kGiven) return bone;
   bone["confidence"] = build.parts.confidence;
   bone["confidence_means"] =
       "share of the mandible's surface that is visible in the CT, bone next to other material; "

@@ -22,7 +22,6 @@ using Json = nlohmann::ordered_json;
 // Bone comes to the skin where streaks of metal were taken for it, or where tissue is thinner than
 // the CT shows: a sound head has next to none.
 constexpr double kMuchBoneInSkin = 0.01;
-constexpr size_t kMaxGapsTold = 5;
 // Fat has -130 to -70 HU.
 constexpr double kLooserThanSkinHu = -180;
 
@@ -81,20 +80,62 @@ QualityCheck CheckParts(const std::string& name, const std::string& required,
 }
 
 // Says so where what is missing is no skin but hair or cloth.
-std::string LooseText(double hu_behind) {
-  if (hu_behind >= kLooserThanSkinHu) return "";
+std::string LooseText(double hu_behind, const InputWords& words) {
+  // HU of surfaces are made from distances.
+  if (words.of_surfaces || hu_behind >= kLooserThanSkinHu) return "";
   return absl::StrFormat(
       " The densest material up to 3 mm behind it has %.0f HU on average, less than fat: "
       "hair or cloth rather than skin.",
       hu_behind);
 }
 
-std::string GapText(const SkinGap& gap, double limit_mm) {
+// One line for all regions that the mesh misses too much of, with the worst; empty without any.
+std::string MissingRegionsText(const SkinCoverage& coverage, const InputWords& words) {
+  std::vector<size_t> missing;
+  for (size_t r = 0; r < coverage.regions.size(); ++r) {
+    if (coverage.regions[r].share() < kLeastCovered) missing.push_back(r);
+  }
+  if (missing.empty()) return "";
+  std::stable_sort(missing.begin(), missing.end(), [&](size_t a, size_t b) {
+    return coverage.regions[a].share() < coverage.regions[b].share();
+  });
+  const CoveredPart& part = coverage.regions[missing.front()];
+  std::string text = absl::StrFormat(
+      "The mesh misses %.1f %% of %s: %.1f of %.1f cm2 of %s are more than %.1f mm "
+      "from the mesh's, up to %.1f mm at %s.",
+      100 * (1 - part.share()), Words(static_cast<SkinRegion>(missing.front())),
+      (part.area_mm2 - part.covered_mm2) / 100, part.area_mm2 / 100, words.the_skin,
+      coverage.tolerance_mm, part.largest_mm, PlaceText(part.farthest));
+  absl::StrAppend(&text, LooseText(part.hu_behind_missing, words));
+  for (size_t i = 1; i < missing.size(); ++i) {
+    absl::StrAppendFormat(&text, "%s %.1f %% of %s", i == 1 ? " It also misses" : ",",
+                          100 * (1 - coverage.regions[missing[i]].share()),
+                          Words(static_cast<SkinRegion>(missing[i])));
+  }
+  return missing.size() > 1 ? text + "." : text;
+}
+
+// One line for all holes that are too large, which are sorted by area, with the largest; empty
+// without any.
+std::string HolesText(const SkinCoverage& coverage, const InputWords& words) {
+  int count = 0;
+  double all_mm2 = 0;
+  for (const SkinGap& hole : coverage.holes) {
+    if (hole.area_mm2 <= kLargestHoleMm2) break;
+    ++count;
+    all_mm2 += hole.area_mm2;
+  }
+  if (count == 0) return "";
+  const SkinGap& largest = coverage.holes.front();
+  const std::string many =
+      count > 1 ? absl::StrFormat("%d places, %.1f cm2 in all; the largest: ", count, all_mm2 / 100)
+                : "";
   const std::string text = absl::StrFormat(
-      "Skin of the CT is missing in the mesh: %.1f cm2 of %s are more than %.1f mm from it, up "
+      "%s is missing in the mesh: %s%.1f cm2 of %s are more than %.1f mm from it, up "
       "to %.1f mm at %s.",
-      gap.area_mm2 / 100, Words(gap.region), limit_mm, gap.largest_mm, PlaceText(gap.farthest));
-  return absl::StrCat(text, LooseText(gap.hu_behind));
+      Capitalized(words.skin_of_source), many, largest.area_mm2 / 100, Words(largest.region),
+      coverage.hole_mm, largest.largest_mm, PlaceText(largest.farthest));
+  return absl::StrCat(text, LooseText(largest.hu_behind, words));
 }
 
 // "the nose (1234 mm2) and the upper lip (56 mm2)"; empty where no named region is cut.
@@ -155,11 +196,11 @@ double BoneShare(const SkinCoverage& coverage) {
 
 }  // namespace
 
-std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage) {
+std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage, const InputWords& words) {
   const size_t worst = WorstRegion(coverage);
   const double worst_share = coverage.regions[worst].share();
-  const std::string within =
-      absl::StrFormat("CT skin within %.1f mm of the mesh's", coverage.tolerance_mm);
+  const std::string within = absl::StrFormat("%s within %.1f mm of the mesh's",
+                                             Capitalized(words.skin), coverage.tolerance_mm);
   return {
       {absl::StrCat(within, ", as a whole"), absl::StrFormat("at least %g %%", 100 * kLeastCovered),
        absl::StrFormat("%.2f %%", 100 * coverage.whole.share()),
@@ -168,32 +209,20 @@ std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage) {
        absl::StrFormat("at least %g %%", 100 * kLeastCovered),
        absl::StrFormat("%.2f %% in %s", 100 * worst_share, Words(static_cast<SkinRegion>(worst))),
        worst_share >= kLeastCovered},
-      CheckParts(absl::StrFormat("Gaps: CT skin farther than %g mm", kGapMm),
+      CheckParts(absl::StrFormat("Gaps: %s farther than %g mm", words.skin, kGapMm),
                  absl::StrFormat("none over %.1f cm2", kLargestGapMm2 / 100), coverage.gaps,
                  kLargestGapMm2),
-      CheckParts(absl::StrFormat("Holes: CT skin farther than %.1f mm", coverage.hole_mm),
+      CheckParts(absl::StrFormat("Holes: %s farther than %.1f mm", words.skin, coverage.hole_mm),
                  absl::StrFormat("none over %.1f cm2", kLargestHoleMm2 / 100), coverage.holes,
                  kLargestHoleMm2)};
 }
 
-std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
+std::vector<std::string> CoverageCautions(const SkinCoverage& coverage, const InputWords& words) {
   std::vector<std::string> cautions;
-  for (size_t r = 0; r < coverage.regions.size(); ++r) {
-    const CoveredPart& part = coverage.regions[r];
-    if (part.share() >= kLeastCovered) continue;
-    const std::string text = absl::StrFormat(
-        "The mesh misses %.1f %% of %s: %.1f of %.1f cm2 of the CT's skin are more than %.1f mm "
-        "from the mesh's, up to %.1f mm at %s.",
-        100 * (1 - part.share()), Words(static_cast<SkinRegion>(r)),
-        (part.area_mm2 - part.covered_mm2) / 100, part.area_mm2 / 100, coverage.tolerance_mm,
-        part.largest_mm, PlaceText(part.farthest));
-    cautions.push_back(absl::StrCat(text, LooseText(part.hu_behind_missing)));
-  }
-  size_t told = 0;
-  for (const SkinGap& hole : coverage.holes) {
-    if (hole.area_mm2 <= kLargestHoleMm2 || told++ == kMaxGapsTold) break;
-    cautions.push_back(GapText(hole, coverage.hole_mm));
-  }
+  const std::string regions = MissingRegionsText(coverage, words);
+  if (!regions.empty()) cautions.push_back(regions);
+  const std::string holes = HolesText(coverage, words);
+  if (!holes.empty()) cautions.push_back(holes);
   if (BoneShare(coverage) > kMuchBoneInSkin) {
     cautions.push_back(
         absl::StrFormat("%.1f %% of the mesh's skin (%.1f cm2) is bone or attached to it: tissue "
@@ -204,7 +233,7 @@ std::vector<std::string> CoverageCautions(const SkinCoverage& coverage) {
   return cautions;
 }
 
-std::vector<std::string> CutCautions(const SkinCoverage& coverage) {
+std::vector<std::string> CutCautions(const SkinCoverage& coverage, const InputWords& words) {
   const std::vector<ScannerCut>& cuts = coverage.cuts;
   if (cuts.empty()) return {};
   const ScannerCut& largest = *std::max_element(
@@ -218,9 +247,10 @@ std::vector<std::string> CutCautions(const SkinCoverage& coverage) {
           ? absl::StrFormat("%d places, %.0f mm2 in all; the largest at ", cuts.size(), all_mm2)
           : "";
   std::string text = absl::StrFormat(
-      "The field of view, or a border of the CT, cuts the face at %s%s: %.0f mm2, between %s and "
+      "%s cuts the face at %s%s: %.0f mm2, between %s and "
       "%s. The face extends beyond it; the model does not. The cut is not treated as skin: it is "
       "counted neither as covered nor as missing.",
+      words.of_surfaces ? "An opening of the skin" : "The field of view, or a border of the CT,",
       many, PlaceText(largest.middle), largest.area_mm2, PlaceText(largest.low),
       PlaceText(largest.high));
   const std::string regions = CutRegionsText(cuts);
@@ -237,9 +267,10 @@ bool NoseIsCut(const SkinCoverage& coverage) {
   });
 }
 
-Json CoverageJson(const SkinCoverage& coverage) {
+Json CoverageJson(const SkinCoverage& coverage, const InputWords& words) {
   Json json = {
-      {"means", "the CT's outer skin in the region of interest, by area, against the mesh's skin"},
+      {"means", absl::StrCat(words.of_surfaces ? words.the_skin : "the CT's outer skin",
+                             " in the region of interest, by area, against the mesh's skin")},
       {"tolerance_mm", coverage.tolerance_mm},
       {"whole", PartJson(coverage.whole)}};
   for (size_t r = 0; r < coverage.regions.size(); ++r) {
@@ -249,7 +280,7 @@ Json CoverageJson(const SkinCoverage& coverage) {
   json["gaps_beyond_4_mm"] = GapsJson(coverage.gaps);
   json["hole_mm"] = coverage.hole_mm;
   json["holes"] = GapsJson(coverage.holes);
-  json["cut_by_scanner"] = CutsJson(coverage.cuts);
+  json[words.of_surfaces ? "cut_by_openings" : "cut_by_scanner"] = CutsJson(coverage.cuts);
   json["mesh_skin_mm2"] = coverage.mesh_skin_mm2;
   json["mesh_skin_on_bone_share"] = BoneShare(coverage);
   return json;
@@ -280,14 +311,16 @@ std::vector<Scene> CoverageScenes(const SkinCoverage& coverage) {
   return scenes;
 }
 
-std::vector<LegendEntry> CoverageLegend(const SkinCoverage& coverage) {
+std::vector<LegendEntry> CoverageLegend(const SkinCoverage& coverage, const InputWords& words) {
   const double gap_mm = std::max(kGapMm, coverage.tolerance_mm);
   std::vector<LegendEntry> legend = {
       {absl::StrFormat("within %.1f mm of the mesh's skin", coverage.tolerance_mm), kCoveredColour},
       {absl::StrFormat("missing: farther than %.1f mm", coverage.tolerance_mm), kMissingColour},
       {absl::StrFormat("farther than %.1f mm", gap_mm), kGapColour}};
   if (coverage.cut_triangles.rows() > 0) {
-    legend.push_back({"cut by the field of view: not skin", kScannerCutColour});
+    legend.push_back(
+        {words.of_surfaces ? "closed opening: not skin" : "cut by the field of view: not skin",
+         kScannerCutColour});
   }
   return legend;
 }

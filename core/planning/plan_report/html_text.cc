@@ -16,6 +16,51 @@
 namespace tissueform {
 namespace {
 
+constexpr char kHead[] = R"(<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>@TITLE@</title>
+<style>
+:root { --ink: #1c2733; --soft: #5b6875; --line: #dde3e9; --paper: #fff; --good: #1b7f4b; --bad: #b3261e; }
+body { margin: 0; background: #eef1f4; color: var(--ink); font: 16px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; }
+main { max-width: 68rem; margin: 0 auto; padding: 0 1rem 3rem; }
+.notice { background: #263442; color: #fff; text-align: center; padding: .5rem 1rem; margin: 0; }
+h1 { font-size: 1.9rem; margin: 1.6rem 0 .3rem; }
+h2 { font-size: 1.25rem; margin: 0 0 .8rem; }
+section, figure { background: var(--paper); border: 1px solid var(--line); border-radius: .6rem; padding: 1.1rem 1.3rem; margin: 1rem 0; overflow-x: auto; }
+.lead { color: var(--soft); margin: 0 0 1rem; }
+.facts { display: flex; flex-wrap: wrap; gap: .8rem; }
+.facts div { flex: 1 1 9rem; background: var(--paper); border: 1px solid var(--line); border-radius: .6rem; padding: .7rem 1rem; }
+.facts b { display: block; font-size: 1.45rem; font-variant-numeric: tabular-nums; }
+.facts span { color: var(--soft); font-size: .9rem; }
+table { border-collapse: collapse; width: 100%; font-size: .93rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; vertical-align: top; padding: .32rem .8rem .32rem 0; border-bottom: 1px solid var(--line); overflow-wrap: anywhere; }
+table:has(th[scope=col]) :is(th, td) { overflow-wrap: normal; }
+th { font-weight: 500; color: var(--soft); }
+th[scope=row] { width: 38%; }
+.passed { color: var(--good); font-weight: 600; }
+.failed { color: var(--bad); font-weight: 600; }
+figure img { width: 100%; height: auto; display: block; }
+figcaption { margin-top: .7rem; }
+.legend { list-style: none; display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; padding: 0; margin: .5rem 0 0; font-size: .93rem; }
+.legend i { display: inline-block; width: .9em; height: .9em; border-radius: .2em; margin-right: .4em; border: 1px solid rgba(0,0,0,.25); vertical-align: -.08em; }
+details > summary { cursor: pointer; font-size: 1.25rem; font-weight: 700; }
+@media print { body { background: #fff; } section, figure { break-inside: avoid; border: 0; padding: 0; } }
+</style>
+</head>
+<body>
+<p class="notice">Research software, not a medical device. Not for diagnosis or treatment.</p>
+<main>
+)";
+
+constexpr char kFoot[] = R"(</main>
+<p class="notice">Research software, not a medical device. Not for diagnosis or treatment.</p>
+</body>
+</html>
+)";
+
 using Json = nlohmann::ordered_json;
 
 constexpr size_t kLongestList = 12;
@@ -104,6 +149,15 @@ std::string LabelOfKey(absl::string_view key) {
   return EscapeHtml(absl::StrCat(absl::StrReplaceAll(key, {{"_", " "}}), unit));
 }
 
+std::string HtmlSection(absl::string_view title, absl::string_view content) {
+  return absl::StrCat("<section>\n<h2>", EscapeHtml(title), "</h2>\n", content, "</section>\n");
+}
+
+std::string HtmlFolded(absl::string_view title, absl::string_view content) {
+  return absl::StrCat("<section><details>\n<summary>", EscapeHtml(title), "</summary>\n", content,
+                      "</details></section>\n");
+}
+
 std::string JsonTable(const Json& object) {
   std::string rows;
   AppendRows("", object, &rows);
@@ -130,6 +184,10 @@ std::string JsonColumns(const Json& list) {
     absl::StrAppend(&html, "</tr>\n");
   }
   return absl::StrCat(html, "</table>\n");
+}
+
+std::string HtmlPage(absl::string_view title, absl::string_view content) {
+  return absl::StrCat(absl::StrReplaceAll(kHead, {{"@TITLE@", EscapeHtml(title)}}), content, kFoot);
 }
 
 }  // namespace tissueform

@@ -95,11 +95,15 @@ std::string LabelsText(const PlanLabels& labels) {
 std::vector<std::string> LabelsCautions(const std::optional<PlanLabels>& labels) {
   std::vector<std::string> cautions;
   if (!labels) return cautions;
+  std::string disagreements;
   for (const StructureAgreement& structure : labels->agreement.structures) {
     if (structure.dice >= kLowDice) continue;
-    cautions.push_back(absl::StrFormat(
-        "The label map and the CT disagree on the %s (Dice %.2f): check the picture of the labels.",
-        structure.name, structure.dice));
+    absl::StrAppendFormat(&disagreements, "%s the %s (Dice %.2f)", disagreements.empty() ? "" : ",",
+                          structure.name, structure.dice);
+  }
+  if (!disagreements.empty()) {
+    cautions.push_back(absl::StrCat("The label map and the CT disagree on", disagreements,
+                                    ": check the picture of the labels."));
   }
   if (labels->fit.has_bone && labels->agreement.bone_in_labels < kLowBoneInLabels) {
     cautions.push_back(absl::StrFormat(

@@ -28,14 +28,14 @@ nlohmann::ordered_json LipsJson(const LipContact& contact, bool parted) {
   return json;
 }
 
-std::vector<std::string> LipsCautions(const LipContact& contact) {
+std::vector<std::string> LipsCautions(const LipContact& contact, const InputWords& words) {
   if (contact.width_mm < kLeastWidthMm) return {};
   return {absl::StrFormat(
-      "The lips are closed in this CT and one piece of tissue in the model: over %.0f of the "
+      "The lips are closed in %s and one piece of tissue in the model: over %.0f of the "
       "middle "
       "%.0f mm of the mouth, %.0f mm deep on average (%.0f mm2), about (%.0f, %.0f, %.0f) mm. They "
       "move together: opening, and sliding of one on the other, are not predicted.",
-      contact.width_mm, contact.examined_mm, contact.depth_mm, contact.area_mm2,
+      words.this_source, contact.width_mm, contact.examined_mm, contact.depth_mm, contact.area_mm2,
       contact.place_mm.x(), contact.place_mm.y(), contact.place_mm.z())};
 }
 

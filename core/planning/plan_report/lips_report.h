@@ -9,6 +9,7 @@
 #include "nlohmann/json.hpp"
 
 #include "core/imaging/anatomy/lip_contact.h"
+#include "core/planning/plan_report/input_words.h"
 
 namespace tissueform {
 
@@ -18,6 +19,6 @@ nlohmann::ordered_json LipsJson(const LipContact& contact, bool parted);
 
 // Where unparted lips are one piece of tissue, and how large it is; nothing where they are parted
 // on all but 5 mm.
-std::vector<std::string> LipsCautions(const LipContact& contact);
+std::vector<std::string> LipsCautions(const LipContact& contact, const InputWords& words = {});
 
 }  // namespace tissueform

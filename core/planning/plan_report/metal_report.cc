@@ -40,13 +40,17 @@ std::vector<double> HeightsToShow(const MetalReport& metal) {
 
 Json MetalJson(const PlanBuild& build) {
   const MetalReport& metal = build.metal;
-  Json json = {{"looked_for", build.recipe.metal.correct}, {"found", metal.any()}};
+  const bool of_ct = build.surface_roles.empty();
+  Json json = {{"looked_for", of_ct && build.recipe.metal.correct}, {"found", metal.any()}};
   if (!metal.any()) return json;
   json["volume_mm3"] = metal.volume_mm3;
   json["threshold_hu"] = metal.threshold_hu;
   json["low_z_mm"] = metal.low_z_mm;
   json["high_z_mm"] = metal.high_z_mm;
   json["corrected_slices"] = metal.corrected_slices;
+  json["skin_carried_over"] = {{"slices", metal.carried.slices},
+                               {"filled_mm3", metal.carried.filled_mm3},
+                               {"removed_mm3", metal.carried.removed_mm3}};
   json["streaks_removed_mm3"] = build.head.streaks_mm3;
   json["streaks_removed_means"] =
       "still as dense as bone after the correction, but as thin as a streak: soft tissue";
@@ -74,6 +78,15 @@ std::vector<std::string> MetalCautions(const PlanBuild& build) {
       "wrong.",
       static_cast<int>(metal.clusters.size()), metal.clusters.size() == 1 ? "" : "s",
       metal.volume_mm3 / 1000, metal.low_z_mm, metal.high_z_mm, metal.corrected_slices)};
+  if (metal.carried.slices > 0) {
+    cautions.push_back(absl::StrFormat(
+        "Streaks tear the skin in %d slices. Its course there was carried over from the slices "
+        "below "
+        "and above: %.1f cm3 became soft tissue, %.1f cm3 outside became air. The shape of the "
+        "skin "
+        "is uncertain there (colored in the picture of the metal).",
+        metal.carried.slices, metal.carried.filled_mm3 / 1000, metal.carried.removed_mm3 / 1000));
+  }
   if (metal.volume_mm3 > kMuchMetalMm3) {
     cautions.push_back(absl::StrFormat(
         "This much metal (%.1f cm3) hides most of the teeth: automatic planes and landmarks "
@@ -92,8 +105,7 @@ MetalSlices DrawMetalSlices(const PlanBuild& build) {
     const std::string at = absl::StrFormat("z = %.1f mm, ", z);
     slices.before.push_back(
         DrawPlainSlice(build.before_correction, over, AxialSlice(at + "original", through)));
-    slices.after.push_back(
-        DrawPlainSlice(build.head.hu, over, AxialSlice(at + "artifacts reduced", through)));
+    slices.after.push_back(DrawCarriedSkin(build, AxialSlice(at + "artifacts reduced", through)));
   }
   return slices;
 }

@@ -67,6 +67,35 @@ const char* KindKey(ObjectKind kind) {
   return "unknown";
 }
 
+// One line for all objects of a kind on the skin, with the one that covers most; empty without any.
+std::string CautionOf(const PlanBuild& build, ObjectKind kind) {
+  const AttachedObject* largest = nullptr;
+  Contact under_largest;
+  int count = 0;
+  double all_mm2 = 0;
+  for (const AttachedObject& object : build.head.objects) {
+    const Contact contact = ContactOf(object, build.soft_tissue.region);
+    if (object.kind != kind || contact.area_mm2 == 0) continue;
+    ++count;
+    all_mm2 += contact.area_mm2;
+    if (largest != nullptr && contact.area_mm2 <= under_largest.area_mm2) continue;
+    largest = &object;
+    under_largest = contact;
+  }
+  if (largest == nullptr) return "";
+  const std::string others =
+      count > 1 ? absl::StrFormat(" So were %d more of this kind; all cover %.1f cm2.", count - 1,
+                                  all_mm2 / 100)
+                : "";
+  return absl::StrFormat(
+      "%s on the skin was removed (%.1f cm3). The skin under it, about %.1f cm2 "
+      "between (%.0f, %.0f, %.0f) and (%.0f, %.0f, %.0f) mm, is not visible in this CT, and its "
+      "boundary there is estimated.%s",
+      KindText(kind), largest->volume_mm3 / 1e3, under_largest.area_mm2 / 100,
+      under_largest.low.x(), under_largest.low.y(), under_largest.low.z(), under_largest.high.x(),
+      under_largest.high.y(), under_largest.high.z(), others);
+}
+
 }  // namespace
 
 QualityCheck CheckObjects(const PlanBuild& build) {
@@ -89,15 +118,9 @@ QualityCheck CheckObjects(const PlanBuild& build) {
 
 std::vector<std::string> ObjectsCautions(const PlanBuild& build) {
   std::vector<std::string> cautions;
-  for (const AttachedObject& object : build.head.objects) {
-    const Contact contact = ContactOf(object, build.soft_tissue.region);
-    if (contact.area_mm2 == 0) continue;
-    cautions.push_back(absl::StrFormat(
-        "%s on the skin was removed (%.1f cm3). The skin under it, about %.1f cm2 "
-        "between (%.0f, %.0f, %.0f) and (%.0f, %.0f, %.0f) mm, is not visible in this CT, and its "
-        "boundary there is estimated.",
-        KindText(object.kind), object.volume_mm3 / 1e3, contact.area_mm2 / 100, contact.low.x(),
-        contact.low.y(), contact.low.z(), contact.high.x(), contact.high.y(), contact.high.z()));
+  for (const ObjectKind kind : {ObjectKind::kTube, ObjectKind::kCord, ObjectKind::kUnknown}) {
+    const std::string caution = CautionOf(build, kind);
+    if (!caution.empty()) cautions.push_back(caution);
   }
   return cautions;
 }

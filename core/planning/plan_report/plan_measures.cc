@@ -15,6 +15,7 @@
 #include "core/mesh/validation.h"
 #include "core/planning/plan_building/slice_gap_check.h"
 #include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/input_words.h"
 #include "core/planning/plan_report/objects_report.h"
 
 namespace tissueform {
@@ -65,8 +66,9 @@ QualityCheck CheckVolume(const PlanMeasures& measures) {
 }
 
 QualityCheck CheckSkin(const std::string& what, double voxels, double limit_voxels,
-                       double spacing_mm) {
-  return {absl::StrCat("Distance of the skin to the CT's, ", what),
+                       const PlanBuild& build) {
+  const double spacing_mm = build.head.hu.geometry.spacing_mm;
+  return {absl::StrCat("Distance of the skin ", WordsOf(build).to_skin, ", ", what),
           absl::StrFormat("at most %g voxels", limit_voxels),
           absl::StrFormat("%.2f voxels (%.2f mm)", voxels, voxels * spacing_mm),
           voxels <= limit_voxels};
@@ -112,7 +114,7 @@ Histogram SkinDistanceHistogram(const PlanMeasures& measures) {
 }
 
 std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasures& measures) {
-  const double spacing_mm = build.head.hu.geometry.spacing_mm;
+  const InputWords words = WordsOf(build);
   std::vector<QualityCheck> checks = {
       {"Inverted tets", "none", absl::StrCat(measures.inverted_tets), measures.inverted_tets == 0},
       {"Tets whose smallest dihedral angle is 3 degrees or more", "at least 99.9 %",
@@ -121,11 +123,13 @@ std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasure
       {"Connected components of the mesh", "one", absl::StrCat(measures.components),
        measures.components == 1},
       CheckVolume(measures),
-      CheckSkin("mean", measures.skin_mean_voxels, kMaxMeanVoxels, spacing_mm),
-      CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMaxP99Voxels, spacing_mm),
-      CheckSliceGaps(build)};
-  for (QualityCheck& check : CheckCoverage(build.coverage)) checks.push_back(std::move(check));
-  checks.push_back(CheckObjects(build));
+      CheckSkin("mean", measures.skin_mean_voxels, kMaxMeanVoxels, build),
+      CheckSkin("99 % of the vertices", measures.skin_p99_voxels, kMaxP99Voxels, build)};
+  if (!words.of_surfaces) checks.push_back(CheckSliceGaps(build));
+  for (QualityCheck& check : CheckCoverage(build.coverage, words)) {
+    checks.push_back(std::move(check));
+  }
+  if (!words.of_surfaces) checks.push_back(CheckObjects(build));
   return checks;
 }
 

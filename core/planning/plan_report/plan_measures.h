@@ -42,7 +42,8 @@ struct QualityCheck {
 
 // No inverted tet; 99.9 % of the tets over 3 degrees; one component; volume within 3 %; skin within
 // 0.6 voxels (mean) and 2 voxels (99 %); the CT's slices at most 5 mm apart where it is planned;
-// and those of CheckCoverage.
+// and those of CheckCoverage. Of a plan from surfaces not what only a CT can miss: slices, objects
+// on the skin.
 std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasures& measures);
 
 // Whether a plan is ready to be used: all are passed.

@@ -11,11 +11,13 @@
 
 #include "core/base/status_macros.h"
 #include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/input_words.h"
 #include "core/planning/plan_report/label_colours.h"
 #include "core/planning/plan_report/metal_report.h"
 #include "core/planning/plan_report/mouth_report.h"
 #include "core/planning/plan_report/plan_scenes.h"
 #include "core/planning/plan_report/slice_pictures.h"
+#include "core/planning/plan_report/values_report.h"
 #include "core/planning/rendering/figure.h"
 
 namespace tissueform {
@@ -50,11 +52,14 @@ std::vector<LegendEntry> WithTissue(std::vector<LegendEntry> legend, const std::
 }
 
 absl::StatusOr<ReportPicture> DrawSlices(const PlanBuild& build, const std::string& folder) {
+  const bool of_surfaces = WordsOf(build).of_surfaces;
   ReportPicture picture{
-      "slices.png", "The CT and its segmentation",
-      "Four slices of the resampled CT, with other objects removed. Radiological "
-      "convention: the patient's right (R) is at the left of the picture, and the midsagittal "
-      "slice looks to the left.",
+      "slices.png", of_surfaces ? "Voxels from the surfaces" : "The CT and its segmentation",
+      absl::StrCat(of_surfaces ? "Four slices of the voxels that the surfaces were filled with."
+                               : "Four slices of the resampled CT, with other objects removed.",
+                   " Radiological convention: the patient's right (R) is at the left of the "
+                   "picture, and the midsagittal "
+                   "slice looks to the left."),
       WithTissue(BoneLegend(build), "modeled soft tissue")};
   std::vector<Picture> panels;
   for (const SlicePlane& plane : PlanSlices(build.landmarks)) {
@@ -94,10 +99,27 @@ absl::StatusOr<ReportPicture> DrawMetal(const PlanBuild& build, const std::strin
       "Slices of the resampled CT through the largest pieces of metal: above the original "
       "images, below the corrected ones, from which the plan was made.",
       {}};
+  if (!build.carried_skin.values.empty()) {
+    picture.legend.push_back(
+        {"uncertain: skin carried over from clean slices", CarriedSkinColour(1)});
+  }
   MetalSlices slices = DrawMetalSlices(build);
   Figure figure(picture.title);
   figure.AddRow(480, std::move(slices.before));
   figure.AddRow(480, std::move(slices.after));
+  TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
+  return picture;
+}
+
+absl::StatusOr<ReportPicture> DrawGrayValues(const PlanBuild& build, const std::string& folder) {
+  ReportPicture picture{"gray_values.png",
+                        "Gray values and the thresholds from them",
+                        "The histogram of the CT. A threshold is half-way between the means of two "
+                        "of its three classes: air, soft tissue, bone with enamel; or as the "
+                        "recipe sets it.",
+                        {}};
+  Figure figure(picture.title);
+  figure.AddRow(500, std::vector<Chart>{GrayHistogramChart(build)});
   TF_RETURN_IF_ERROR(WriteFigure(picture, figure, folder));
   return picture;
 }
@@ -130,10 +152,13 @@ absl::StatusOr<ReportPicture> DrawSkin(const PlanBuild& build, const std::string
 }
 
 absl::StatusOr<ReportPicture> DrawCoverage(const PlanBuild& build, const std::string& folder) {
+  const InputWords words = WordsOf(build);
   ReportPicture picture{
-      "coverage.png", "Skin of the CT, and where the mesh misses it",
-      "The outer skin of the CT within the region of interest. Red is missing in the mesh.",
-      CoverageLegend(build.coverage)};
+      "coverage.png",
+      absl::StrCat(Capitalized(words.skin_of_source), ", and where the mesh misses it"),
+      absl::StrCat(words.of_surfaces ? "The given skin" : "The outer skin of the CT",
+                   " within the region of interest. Red is missing in the mesh."),
+      CoverageLegend(build.coverage, words)};
   Figure figure(picture.title);
   std::vector<Scene> scenes = CoverageScenes(build.coverage);
   figure.AddRow(kSceneHeightPx, {scenes[0], scenes[1]});
@@ -146,8 +171,9 @@ absl::StatusOr<ReportPicture> DrawMouth(const PlanBuild& build, const MouthLine&
                                         const std::string& folder) {
   const ReportPicture picture{
       "mouth.png", "Line between the lips",
-      absl::StrCat("The CT's skin about the mouth, with the line between the lips; the model ",
-                   build.lips ? "parts along it. " : "does not use it. ",
+      absl::StrCat(Capitalized(WordsOf(build).the_skin),
+                   " about the mouth, with the line between the lips; the model ",
+                   build.lips ? "parts along it. " : "does not part there. ",
                    absl::StrJoin(DescribeMouthLine(mouth), " ")),
       MouthLegend()};
   TF_RETURN_IF_ERROR(
@@ -177,11 +203,13 @@ absl::StatusOr<ReportPicture> DrawConstraints(const PlanBuild& build, const std:
 }
 
 absl::StatusOr<ReportPicture> DrawTets(const PlanBuild& build, const std::string& folder) {
-  ReportPicture picture{"tets.png",
-                        "Inside the mesh: tets by tissue",
-                        "The mesh cut open. The tissue of a tet, and so its stiffness, comes from "
-                        "the CT numbers in it.",
-                        {}};
+  ReportPicture picture{
+      "tets.png",
+      "Inside the mesh: tets by tissue",
+      absl::StrCat("The mesh cut open. The tissue of a tet, and so its stiffness, comes from ",
+                   WordsOf(build).of_surfaces ? "the surface of a tissue that it is in."
+                                              : "the CT numbers in it."),
+      {}};
   for (size_t t = 0; t < build.recipe.tissues.size(); ++t) {
     const TissueClass& tissue = build.recipe.tissues[t];
     picture.legend.push_back(
@@ -200,14 +228,15 @@ Curve LimitCurve(const std::string& name, double x, const Curve& beside, CurveSt
   return {.name = name, .x = {x, x}, .y = {*low, *high}, .colour = kOrange, .style = style};
 }
 
-absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
+absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures, const InputWords& words,
                                              const std::string& folder) {
-  ReportPicture picture{"quality.png",
-                        "Quality of the mesh",
-                        "Left: the smallest dihedral angle of each tet; 99.9 % must reach 3 "
-                        "degrees. Right: distance of the mesh's skin to the CT's; the mean "
-                        "must be at most 0.6 voxels, and 99 % within 2.",
-                        {}};
+  ReportPicture picture{
+      "quality.png",
+      "Quality of the mesh",
+      absl::StrCat("Left: the smallest dihedral angle of each tet; 99.9 % must "
+                   "reach 3 degrees. Right: distance of the mesh's skin ",
+                   words.to_skin, "; the mean must be at most 0.6 voxels, and 99 % within 2."),
+      {}};
   const Curve angles = HistogramCurve(DihedralHistogram(measures), "tets", kBlue);
   const Curve distances =
       HistogramCurve(SkinDistanceHistogram(measures), "vertices", kBlue, kLeastPercent);
@@ -218,7 +247,7 @@ absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
                 .x_title = "angle [degrees]",
                 .y_title = "tets [%]",
                 .curves = {angles, LimitCurve("3 degrees", 3, angles, CurveStyle::kDashed)}},
-               {.title = "Distance of the skin to the CT's",
+               {.title = absl::StrCat("Distance of the skin ", words.to_skin),
                 .x_title = "distance [voxels]",
                 .y_title = "vertices on skin [%]",
                 .logarithmic_y = true,
@@ -232,7 +261,6 @@ absl::StatusOr<ReportPicture> DrawHistograms(const PlanMeasures& measures,
 
 absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& build,
                                                             const PlanMeasures& measures,
-                                                            const absl::StatusOr<MouthLine>& mouth,
                                                             const std::string& folder) {
   std::vector<ReportPicture> pictures;
   for (const auto draw :
@@ -244,19 +272,23 @@ absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& bui
     TF_ASSIGN_OR_RETURN(ReportPicture labels, DrawLabels(build, folder));
     pictures.insert(pictures.begin() + 1, std::move(labels));
   }
-  if (mouth.ok()) {
-    TF_ASSIGN_OR_RETURN(ReportPicture line, DrawMouth(build, *mouth, folder));
+  if (build.mouth.ok()) {
+    TF_ASSIGN_OR_RETURN(ReportPicture line, DrawMouth(build, *build.mouth, folder));
     pictures.push_back(std::move(line));
   }
   if (build.lips) {
     TF_ASSIGN_OR_RETURN(ReportPicture contact, DrawLipContact(build, folder));
     pictures.push_back(std::move(contact));
   }
+  if (build.values.gray) {
+    TF_ASSIGN_OR_RETURN(ReportPicture gray, DrawGrayValues(build, folder));
+    pictures.insert(pictures.begin() + 1, std::move(gray));
+  }
   if (build.metal.any()) {
     TF_ASSIGN_OR_RETURN(ReportPicture metal, DrawMetal(build, folder));
     pictures.insert(pictures.begin() + 1, std::move(metal));
   }
-  TF_ASSIGN_OR_RETURN(ReportPicture quality, DrawHistograms(measures, folder));
+  TF_ASSIGN_OR_RETURN(ReportPicture quality, DrawHistograms(measures, WordsOf(build), folder));
   pictures.push_back(std::move(quality));
   return pictures;
 }

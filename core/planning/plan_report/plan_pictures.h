@@ -8,7 +8,6 @@
 
 #include "absl/status/statusor.h"
 
-#include "core/imaging/anatomy/mouth_line.h"
 #include "core/planning/plan_building/plan_builder.h"
 #include "core/planning/plan_report/plan_measures.h"
 #include "core/planning/rendering/panels.h"
@@ -35,7 +34,6 @@ struct ReportPicture {
 // Errors: those of Figure::WritePng and ExtractSurface.
 absl::StatusOr<std::vector<ReportPicture>> DrawPlanPictures(const PlanBuild& build,
                                                             const PlanMeasures& measures,
-                                                            const absl::StatusOr<MouthLine>& mouth,
                                                             const std::string& folder);
 
 }  // namespace tissueform

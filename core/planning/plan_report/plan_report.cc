@@ -12,7 +12,6 @@
 
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
-#include "core/imaging/anatomy/mouth_line.h"
 #include "core/planning/plan_report/plan_measures.h"
 #include "core/planning/plan_report/plan_pictures.h"
 #include "core/planning/plan_report/report_html.h"
@@ -23,7 +22,6 @@ namespace {
 
 absl::StatusOr<std::vector<ReportPicture>> Draw(const PlanBuild& build,
                                                 const PlanMeasures& measures,
-                                                const absl::StatusOr<MouthLine>& mouth,
                                                 const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directory(folder, error);
@@ -31,7 +29,7 @@ absl::StatusOr<std::vector<ReportPicture>> Draw(const PlanBuild& build,
     return absl::FailedPreconditionError(
         absl::StrCat("cannot create the folder ", folder.string(), ": ", error.message()));
   }
-  return DrawPlanPictures(build, measures, mouth, folder.string());
+  return DrawPlanPictures(build, measures, folder.string());
 }
 
 }  // namespace
@@ -40,16 +38,14 @@ absl::Status WritePlanReport(const PlanBuild& build, const PlanReportOptions& op
                              const std::string& folder) {
   const std::filesystem::path root = folder;
   const PlanMeasures measures = MeasurePlan(build);
-  const absl::StatusOr<MouthLine> mouth =
-      build.lips ? build.lips->line : FindMouthLine(build.head, build.landmarks);
   std::vector<ReportPicture> pictures;
   if (options.pictures) {
     TellStage(options.tell, "drawing the pictures", 0);
-    TF_ASSIGN_OR_RETURN(pictures, Draw(build, measures, mouth, root / "pictures"));
+    TF_ASSIGN_OR_RETURN(pictures, Draw(build, measures, root / "pictures"));
   }
   TellStage(options.tell, "writing the report", 0.9);
   const nlohmann::ordered_json report =
-      PlanReportJson(build, measures, mouth, options.program_version, pictures);
+      PlanReportJson(build, measures, options.program_version, pictures);
   TF_RETURN_IF_ERROR(WriteFileAtomically((root / "report.json").string(), report.dump(2) + "\n"));
   return WriteFileAtomically((root / "report.html").string(), PlanReportHtml(report, pictures));
 }

@@ -7,67 +7,15 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 
 #include "core/planning/plan_report/html_text.h"
+#include "core/planning/plan_report/input_words.h"
 
 namespace tissueform {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr char kHead[] = R"(<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Planning model: report</title>
-<style>
-:root { --ink: #1c2733; --soft: #5b6875; --line: #dde3e9; --paper: #fff; --good: #1b7f4b; --bad: #b3261e; }
-body { margin: 0; background: #eef1f4; color: var(--ink); font: 16px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; }
-main { max-width: 68rem; margin: 0 auto; padding: 0 1rem 3rem; }
-.notice { background: #263442; color: #fff; text-align: center; padding: .5rem 1rem; margin: 0; }
-h1 { font-size: 1.9rem; margin: 1.6rem 0 .3rem; }
-h2 { font-size: 1.25rem; margin: 0 0 .8rem; }
-section, figure { background: var(--paper); border: 1px solid var(--line); border-radius: .6rem; padding: 1.1rem 1.3rem; margin: 1rem 0; overflow-x: auto; }
-.lead { color: var(--soft); margin: 0 0 1rem; }
-.facts { display: flex; flex-wrap: wrap; gap: .8rem; }
-.facts div { flex: 1 1 9rem; background: var(--paper); border: 1px solid var(--line); border-radius: .6rem; padding: .7rem 1rem; }
-.facts b { display: block; font-size: 1.45rem; font-variant-numeric: tabular-nums; }
-.facts span { color: var(--soft); font-size: .9rem; }
-table { border-collapse: collapse; width: 100%; font-size: .93rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; vertical-align: top; padding: .32rem .8rem .32rem 0; border-bottom: 1px solid var(--line); overflow-wrap: anywhere; }
-th { font-weight: 500; color: var(--soft); }
-th[scope=row] { width: 38%; }
-.passed { color: var(--good); font-weight: 600; }
-.failed { color: var(--bad); font-weight: 600; }
-figure img { width: 100%; height: auto; display: block; }
-figcaption { margin-top: .7rem; }
-.legend { list-style: none; display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; padding: 0; margin: .5rem 0 0; font-size: .93rem; }
-.legend i { display: inline-block; width: .9em; height: .9em; border-radius: .2em; margin-right: .4em; border: 1px solid rgba(0,0,0,.25); vertical-align: -.08em; }
-details > summary { cursor: pointer; font-size: 1.25rem; font-weight: 700; }
-@media print { body { background: #fff; } section, figure { break-inside: avoid; border: 0; padding: 0; } }
-</style>
-</head>
-<body>
-<p class="notice">Research software, not a medical device. Not for diagnosis or treatment.</p>
-<main>
-)";
-
-constexpr char kFoot[] = R"(</main>
-<p class="notice">Research software, not a medical device. Not for diagnosis or treatment.</p>
-</body>
-</html>
-)";
-
-std::string Section(const std::string& title, const std::string& content) {
-  return absl::StrCat("<section>\n<h2>", EscapeHtml(title), "</h2>\n", content, "</section>\n");
-}
-
-// For those who want to look it up: closed at first.
-std::string Folded(const std::string& title, const std::string& content) {
-  return absl::StrCat("<section><details>\n<summary>", EscapeHtml(title), "</summary>\n", content,
-                      "</details></section>\n");
-}
 
 std::string Fact(const std::string& number, const std::string& name) {
   return absl::StrCat("<div><b>", EscapeHtml(number), "</b><span>", EscapeHtml(name),
@@ -78,15 +26,21 @@ std::string Thousands(const Json& count) {
   return absl::StrFormat("%.1f k", count.get<double>() / 1000);
 }
 
+InputWords WordsOf(const Json& report) {
+  return report["input"].contains("surfaces") ? WordsOfSurfaces() : InputWords();
+}
+
 std::string Facts(const Json& report) {
+  const InputWords words = WordsOf(report);
+  const char* const distance = words.of_surfaces ? "skin_to_surfaces" : "skin_to_ct";
   const double tissue_cm3 = report["soft_tissue"]["volume_mm3"].get<double>() / 1000;
   return absl::StrCat(
       "<div class=\"facts\">\n", Fact(Thousands(report["mesh"]["vertices"]), "vertices"),
       Fact(Thousands(report["mesh"]["tets"]), "tets"),
       Fact(absl::StrFormat("%.0f cm³", tissue_cm3), "soft tissue"),
       Fact(absl::StrCat(report["segments"].size()), "moved segments"),
-      Fact(absl::StrFormat("%.2f mm", report["distances"]["skin_to_ct"]["mean_mm"].get<double>()),
-           "mean distance of the skin to the CT's"),
+      Fact(absl::StrFormat("%.2f mm", report["distances"][distance]["mean_mm"].get<double>()),
+           absl::StrCat("mean distance of the skin ", words.to_skin)),
       "</div>\n");
 }
 
@@ -108,9 +62,15 @@ std::string SegmentText(const Json& segment) {
 }
 
 std::string Title(const Json& report) {
-  return report["ready"].get<bool>()
-             ? "<h1>Planning model from a CT</h1>\n"
-             : "<h1>Planning model from a CT: <span class=\"failed\">not ready</span></h1>\n";
+  return absl::StrCat(
+      "<h1>Planning model from ", WordsOf(report).a_source,
+      report["ready"].get<bool>() ? "" : ": <span class=\"failed\">not ready</span>", "</h1>\n");
+}
+
+// "DICOM", or the surfaces by their roles.
+std::string SourceText(const Json& input) {
+  if (!input.contains("surfaces")) return input["format"];
+  return absl::StrJoin(input["surfaces"].get<std::vector<std::string>>(), ", ");
 }
 
 std::string Lead(const Json& report) {
@@ -118,8 +78,9 @@ std::string Lead(const Json& report) {
   for (const Json& segment : report["segments"]) {
     absl::StrAppend(&segments, segments.empty() ? "" : "; ", SegmentText(segment));
   }
-  return absl::StrCat("<p class=\"lead\">", EscapeHtml(segments), ". Made from a CT (",
-                      EscapeHtml(report["input"]["format"].get<std::string>()), ") by tissueform ",
+  return absl::StrCat("<p class=\"lead\">", EscapeHtml(segments), ". Made from ",
+                      WordsOf(report).a_source, " (", EscapeHtml(SourceText(report["input"])),
+                      ") by tissueform ",
                       EscapeHtml(report["program"]["tissueform"].get<std::string>()), ".</p>\n");
 }
 
@@ -134,7 +95,7 @@ std::string QualitySection(const Json& checks) {
                     EscapeHtml(check["measured"].get<std::string>()), "</td><td class=\"",
                     passed ? "passed\">✓ met" : "failed\">✗ not met", "</td></tr>\n");
   }
-  return Section(
+  return HtmlSection(
       all ? "Quality: all requirements are met" : "Quality: not all requirements are met",
       absl::StrCat("<table>\n<tr><th scope=\"col\">requirement</th><th "
                    "scope=\"col\">required</th><th scope=\"col\">measured</th><th "
@@ -142,13 +103,15 @@ std::string QualitySection(const Json& checks) {
                    rows, "</table>\n"));
 }
 
-std::string CautionsSection(const Json& cautions) {
+std::string CautionsSection(const Json& report) {
+  const Json& cautions = report["cautions"];
   if (cautions.empty()) return "";
   std::string items;
   for (const Json& caution : cautions) {
     absl::StrAppend(&items, "<li>", EscapeHtml(caution.get<std::string>()), "</li>\n");
   }
-  return Section("Limitations of this CT", absl::StrCat("<ul>\n", items, "</ul>\n"));
+  return HtmlSection(absl::StrCat("Limitations of ", WordsOf(report).this_source),
+                     absl::StrCat("<ul>\n", items, "</ul>\n"));
 }
 
 std::string LegendHtml(const std::vector<LegendEntry>& legend) {
@@ -188,7 +151,12 @@ std::string MetalSection(const Json& report) {
   if (!metal.value("found", false)) return "";
   Json rest = metal;
   rest.erase("pieces");
-  return Section("Metal", JsonTable(rest) + JsonColumns(metal["pieces"]));
+  return HtmlSection("Metal", JsonTable(rest) + JsonColumns(metal["pieces"]));
+}
+
+std::string ValuesSection(const Json& report) {
+  const Json values = report.value("values", Json());
+  return values.is_object() ? HtmlSection("Values and field of view", JsonTable(values)) : "";
 }
 
 std::string LabelsSection(const Json& report) {
@@ -196,8 +164,8 @@ std::string LabelsSection(const Json& report) {
   if (!labels.is_object()) return "";
   Json rest = labels;
   for (const char* const key : {"agreement", "segments"}) rest.erase(key);
-  return Section("Label map", JsonColumns(labels["agreement"]) + JsonTable(rest) +
-                                  JsonColumns(labels["segments"]));
+  return HtmlSection("Label map", JsonColumns(labels["agreement"]) + JsonTable(rest) +
+                                      JsonColumns(labels["segments"]));
 }
 
 // The sentences; the points are for programs.
@@ -209,33 +177,35 @@ std::string MouthSection(const Json& report) {
       absl::StrAppend(&texts, "<p>", EscapeHtml(text.get<std::string>()), "</p>\n");
     }
   }
-  return texts.empty() ? "" : Section("Line between the lips", texts);
+  return texts.empty() ? "" : HtmlSection("Line between the lips", texts);
 }
 
 std::string Tables(const Json& report) {
   return absl::StrCat(
-      Section("Segments", SegmentTables(report["segments"])),
-      Section("Bone and its separation", JsonTable(report["bone"])), LabelsSection(report),
-      MetalSection(report), MouthSection(report), Section("Mesh", JsonTable(report["mesh"])),
-      Section("Distances", JsonTable(report["distances"])),
-      Section("The CT's skin in the mesh", JsonTable(report["coverage"])),
-      Section("Stiffness", StiffnessHtml(report["stiffness"])),
-      Section("Fixed, moved and free", JsonTable(report["regions"])),
-      Section("Head and soft tissue", JsonTable(report["head"]) + JsonTable(report["soft_tissue"])),
-      Folded("Landmarks", JsonTable(report["landmarks"])),
-      Folded("Planes of the region of interest", JsonTable(report["region_of_interest"])),
-      Folded("Recipe, with all defaults", JsonTable(report["recipe"])),
-      Section("Input and program", JsonTable(report["input"]) + JsonTable(report["program"])));
+      HtmlSection("Segments", SegmentTables(report["segments"])),
+      HtmlSection("Bone and its separation", JsonTable(report["bone"])), ValuesSection(report),
+      LabelsSection(report), MetalSection(report), MouthSection(report),
+      HtmlSection("Mesh", JsonTable(report["mesh"])),
+      HtmlSection("Distances", JsonTable(report["distances"])),
+      HtmlSection(absl::StrCat(Capitalized(WordsOf(report).the_skin), " in the mesh"),
+                  JsonTable(report["coverage"])),
+      HtmlSection("Stiffness", StiffnessHtml(report["stiffness"])),
+      HtmlSection("Fixed, moved and free", JsonTable(report["regions"])),
+      HtmlSection("Head and soft tissue",
+                  JsonTable(report["head"]) + JsonTable(report["soft_tissue"])),
+      HtmlFolded("Landmarks", JsonTable(report["landmarks"])),
+      HtmlFolded("Planes of the region of interest", JsonTable(report["region_of_interest"])),
+      HtmlFolded("Recipe, with all defaults", JsonTable(report["recipe"])),
+      HtmlSection("Input and program", JsonTable(report["input"]) + JsonTable(report["program"])));
 }
 
 }  // namespace
 
 std::string PlanReportHtml(const Json& report, const std::vector<ReportPicture>& pictures) {
-  std::string html =
-      absl::StrCat(kHead, Title(report), Lead(report), Facts(report),
-                   QualitySection(report["quality"]), CautionsSection(report["cautions"]));
+  std::string html = absl::StrCat(Title(report), Lead(report), Facts(report),
+                                  QualitySection(report["quality"]), CautionsSection(report));
   for (const ReportPicture& picture : pictures) html += PictureHtml(picture);
-  return absl::StrCat(html, Tables(report), kFoot);
+  return HtmlPage("Planning model: report", html + Tables(report));
 }
 
 }  // namespace tissueform

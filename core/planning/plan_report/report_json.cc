@@ -13,11 +13,13 @@
 #include "core/planning/plan_report/anatomy_json.h"
 #include "core/planning/plan_report/cautions.h"
 #include "core/planning/plan_report/coverage_report.h"
+#include "core/planning/plan_report/input_words.h"
 #include "core/planning/plan_report/labels_report.h"
 #include "core/planning/plan_report/library_versions.h"
 #include "core/planning/plan_report/lips_report.h"
 #include "core/planning/plan_report/metal_report.h"
 #include "core/planning/plan_report/mouth_report.h"
+#include "core/planning/plan_report/values_report.h"
 
 namespace tissueform {
 namespace {
@@ -32,7 +34,15 @@ Json ProgramJson(const std::string& program_version) {
           {"tetgen", kTetgenVersion}};
 }
 
+Json SurfacesInputJson(const PlanBuild& build) {
+  return {{"format", build.ct.format},       {"files", build.ct.num_files},
+          {"surfaces", build.surface_roles}, {"surfaces_sha256", build.ct.sha256},
+          {"size_voxels", build.ct_size},    {"spacing_mm", ToJson(build.ct_spacing_mm)},
+          {"notes", build.ct.notes}};
+}
+
 Json InputJson(const PlanBuild& build) {
+  if (!build.surface_roles.empty()) return SurfacesInputJson(build);
   return {{"format", build.ct.format},
           {"files", build.ct.num_files},
           {"ct_sha256", build.ct.sha256},
@@ -79,7 +89,7 @@ Json DistanceJson(const SurfaceDistances& distance) {
 
 Json DistancesJson(const PlanBuild& build, const PlanMeasures& measures) {
   const SkinDistance& skin = build.skin_distance;
-  return {{"skin_to_ct",
+  return {{build.surface_roles.empty() ? "skin_to_ct" : "skin_to_surfaces",
            {{"vertices", skin.mm.size()},
             {"not_found", skin.not_found},
             {"mean_mm", skin.mean_mm},
@@ -99,7 +109,8 @@ Json StiffnessJson(const PlanBuild& build, const PlanMeasures& measures) {
     const TissueClass& tissue = build.recipe.tissues[t];
     Json row = {{"name", tissue.name}, {"youngs_modulus_pa", tissue.youngs_modulus_pa}};
     if (tissue.factor_95 != 0) row["youngs_modulus_factor_95"] = tissue.factor_95;
-    if (t + 1 < build.recipe.tissues.size()) row["hu_below"] = tissue.hu_below;
+    const bool has_next = t + 1 < build.recipe.tissues.size();
+    if (has_next && build.surface_roles.empty()) row["hu_below"] = tissue.hu_below;
     row["tets"] = measures.tets_of_tissue[t];
     row["source"] = tissue.source;
     tissues.push_back(std::move(row));
@@ -163,7 +174,7 @@ Json PicturesJson(const std::vector<ReportPicture>& pictures) {
 }  // namespace
 
 Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
-                    const absl::StatusOr<MouthLine>& mouth, const std::string& program_version,
+                    const std::string& program_version,
                     const std::vector<ReportPicture>& pictures) {
   return {{"format", "tissueform-plan-report"},
           {"version", 1},
@@ -174,6 +185,7 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"cautions", Cautions(build)},
           {"program", ProgramJson(program_version)},
           {"input", InputJson(build)},
+          {"values", ValuesJson(build)},
           {"metal", MetalJson(build)},
           {"labels", LabelsJson(build.labels)},
           {"head", HeadJson(build)},
@@ -184,11 +196,11 @@ Json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
           {"soft_tissue", SoftTissueJson(build.soft_tissue)},
           {"lips", LipsJson(MeasureLipContact(build.soft_tissue.labels, build.landmarks),
                             build.lips.has_value())},
-          {"mouth_line", MouthJson(mouth, build.landmarks)},
+          {"mouth_line", MouthJson(build.mouth, build.landmarks)},
           {"lip_contact", LipContactJson(build.lips)},
           {"mesh", MeshJson(build, measures)},
           {"distances", DistancesJson(build, measures)},
-          {"coverage", CoverageJson(build.coverage)},
+          {"coverage", CoverageJson(build.coverage, WordsOf(build))},
           {"stiffness", StiffnessJson(build, measures)},
           {"regions", RegionsJson(build)},
           {"pictures", PicturesJson(pictures)},

@@ -9,7 +9,6 @@
 #include "absl/status/statusor.h"
 #include "nlohmann/json.hpp"
 
-#include "core/imaging/anatomy/mouth_line.h"
 #include "core/planning/plan_building/plan_builder.h"
 #include "core/planning/plan_report/plan_measures.h"
 #include "core/planning/plan_report/plan_pictures.h"
@@ -18,7 +17,6 @@ namespace tissueform {
 
 // report.json (docs/recipe-format.md tells its keys).
 nlohmann::ordered_json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
-                                      const absl::StatusOr<MouthLine>& mouth,
                                       const std::string& program_version,
                                       const std::vector<ReportPicture>& pictures);
 

@@ -183,6 +183,17 @@ Picture DrawLabelDifference(const PlanBuild& build, const SlicePlane& plane) {
       DifferenceColour, plane);
 }
 
+Picture DrawCarriedSkin(const PlanBuild& build, const SlicePlane& plane) {
+  const LabelGrid& carried = build.carried_skin;
+  if (carried.values.empty()) return DrawPlainSlice(build.head.hu, build.head.hu.geometry, plane);
+  return DrawLabelled(
+      build.head.hu,
+      [&carried](const Vector3d& place_mm) { return NearestValue(carried, place_mm); },
+      CarriedSkinColour, plane);
+}
+
+Colour CarriedSkinColour(uint8_t /*carried*/) { return SegmentColour(0); }
+
 Colour DifferenceColour(uint8_t difference) {
   if (difference == kOnlyInLabels) return SegmentColour(1);
   return difference == kOnlyInImage ? SegmentColour(0) : SegmentColour(2);

@@ -43,4 +43,9 @@ Picture DrawSlice(const PlanBuild& build, const SlicePlane& plane);
 Picture DrawLabelDifference(const PlanBuild& build, const SlicePlane& plane);
 Colour DifferenceColour(uint8_t difference);
 
+// Where the skin was carried over in slices with metal: the CT in grey with PlanBuild::carried_skin
+// in its color, if any.
+Picture DrawCarriedSkin(const PlanBuild& build, const SlicePlane& plane);
+Colour CarriedSkinColour(uint8_t carried);
+
 }  // namespace tissueform

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Logins and TLS, and what a local server and the doctor say."""
 
+import importlib.metadata
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -12,6 +14,7 @@ import time
 import unittest
 import unittest.mock
 
+import grpc
 import jwt
 import tissueform
 from programs import SERVER, start_server, tissueform_command
@@ -99,7 +102,7 @@ class LoginTest(unittest.TestCase):
 class DoctorTest(unittest.TestCase):
     def test_a_healthy_server_is_ok_in_all_lines(self):
         lines = tissueform.doctor(server.address, token=token(), tls=tls())
-        self.assertEqual([line.check for line in lines], ["route", "login", "clock", "version", "limits", "work"])
+        self.assertEqual([line.check for line in lines], ["libraries", "route", "login", "clock", "version", "limits", "work"])
         self.assertEqual({line.finding for line in lines}, {"ok"})
 
     def test_the_first_failure_ends_it_with_advice(self):
@@ -115,6 +118,23 @@ class DoctorTest(unittest.TestCase):
                 self.assertEqual(done.returncode, code)
                 self.assertIn(words, done.stdout)
 
+    def test_without_a_server_the_command_names_the_versions_of_this_machine(self):
+        done = subprocess.run([sys.executable, "-m", "tissueform", "doctor"], stdout=subprocess.PIPE, text=True, check=True)
+        self.assertRegex(done.stdout, rf"^ok       libraries   Python 3\.\S+, tissueform \S+, grpcio {re.escape(grpc.__version__)}, protobuf \S+, numpy \S+\n$")
+
+    def test_the_package_has_the_version_of_the_server(self):
+        (line,) = [line for line in tissueform.doctor(server.address, token=token(), tls=tls()) if line.check == "version"]
+        own = importlib.metadata.version("tissueform")
+        self.assertEqual(line.text, f"server {own}, this package {own}, protocol tissueform.v1")
+
+    def test_with_an_old_library_the_command_prints_the_line_for_pip_alone(self):
+        with tempfile.TemporaryDirectory() as folder:
+            pathlib.Path(folder, "grpc.py").write_text('__version__ = "1.48.4"')
+            done = subprocess.run([sys.executable, "-m", "tissueform", "doctor"], env={**os.environ, "PYTHONPATH": folder},
+                                  stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"^tissueform needs grpcio 1\.49 or newer, found 1\.48\.4: pip install --upgrade .*\n$")
+
 
 class LocalServerTest(unittest.TestCase):
     def test_it_ends_with_its_block(self):
@@ -124,7 +144,8 @@ class LocalServerTest(unittest.TestCase):
             tissueform.connect(local.address, timeout=0.2)
 
     def test_it_ends_with_a_parent_that_is_killed(self):
-        script = f"import os, signal, tissueform; s = tissueform.local({str(SERVER)!r}); print(s.address, flush=True); os.kill(os.getpid(), signal.SIGKILL)"
+        script = (f"import os, signal, tissueform; s = tissueform.local({str(SERVER)!r}); print(s.address, flush=True); "
+                  "os.kill(os.getpid(), signal.SIGKILL)")
         done = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
         give_up = time.monotonic() + 10
         while time.monotonic() < give_up:

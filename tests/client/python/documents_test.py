@@ -4,7 +4,6 @@
 
 import json
 import os
-import pathlib
 import re
 import subprocess
 import sys
@@ -75,9 +74,9 @@ class NotebookTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([sys.executable, "-m", "ipykernel", "install", "--prefix", folder, "--name", "venv"], check=True, capture_output=True)
             environment = {"PATH": f"{BIN}:{os.environ['PATH']}", "JUPYTER_PATH": f"{folder}/share/jupyter", "PYDEVD_DISABLE_FILE_VALIDATION": "1",
-                           "MPLCONFIGDIR": folder, "IPYTHONDIR": folder, "HOME": folder}
+                           "TISSUEFORM_SOURCE": str(SOURCE), "MPLCONFIGDIR": folder, "TMPDIR": folder, "IPYTHONDIR": folder, "HOME": folder}
             with unittest.mock.patch.dict(os.environ, environment):
-                nbclient.NotebookClient(notebook, timeout=60, kernel_name="venv", resources={"metadata": {"path": folder}}).execute()
+                nbclient.NotebookClient(notebook, timeout=120, kernel_name="venv", resources={"metadata": {"path": folder}}).execute()
         return json.dumps(notebook.cells)
 
     def test_the_bar_is_dragged(self):
@@ -87,6 +86,17 @@ class NotebookTest(unittest.TestCase):
         text = self.run_notebook("stiffness_study.ipynb")
         self.assertIn("image/png", text)
         self.assertRegex(text, r"ratio 32: tip moves \d")
+
+    def test_labels_lead_to_a_plan_and_a_face(self):
+        text = self.run_notebook("labels_to_face.ipynb")
+        self.assertIn("image/png", text)
+        self.assertRegex(text, r"lower jaw with teeth: Dice 0\.9")
+        self.assertRegex(text, r"jaw 8 mm forward: skin of the chin 7\.\d mm")
+
+    def test_a_cohort_is_compared_with_the_operated_faces(self):
+        text = self.run_notebook("cohort.ipynb")
+        self.assertIn("image/png", text)
+        self.assertRegex(text, r"lower lip, planned: \d\.\d mm nearer than no prediction, p = 0\.125 \(4 pairs\)")
 
 
 if __name__ == "__main__":

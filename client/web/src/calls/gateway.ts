@@ -9,6 +9,7 @@ import { CaseService } from "../generated/tissueform/v1/case_service_pb";
 import { DeformService } from "../generated/tissueform/v1/deform_service_pb";
 import { ExportService } from "../generated/tissueform/v1/export_service_pb";
 import { MeshService } from "../generated/tissueform/v1/mesh_service_pb";
+import { PlanBuildService } from "../generated/tissueform/v1/plan_build_service_pb";
 import { PlanService } from "../generated/tissueform/v1/plan_service_pb";
 import { PredictionService } from "../generated/tissueform/v1/prediction_service_pb";
 import { ServerInfoService } from "../generated/tissueform/v1/server_info_pb";
@@ -49,6 +50,7 @@ export class Gateway {
   readonly meshes: Client<typeof MeshService>;
   readonly sessions: Client<typeof SessionService>;
   readonly plans: Client<typeof PlanService>;
+  readonly planBuilds: Client<typeof PlanBuildService>;
   readonly predictions: Client<typeof PredictionService>;
   readonly deform: Client<typeof DeformService>;
   readonly exports: Client<typeof ExportService>;
@@ -71,6 +73,7 @@ export class Gateway {
     this.meshes = createClient(MeshService, transport);
     this.sessions = createClient(SessionService, transport);
     this.plans = createClient(PlanService, transport);
+    this.planBuilds = createClient(PlanBuildService, transport);
     this.predictions = createClient(PredictionService, transport);
     this.deform = createClient(DeformService, transport);
     this.exports = createClient(ExportService, transport);

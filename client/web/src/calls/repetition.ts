@@ -9,7 +9,7 @@ import { NODE_HEADER, SESSION_HEADER, type SessionRoutes } from "./session_route
 /** How long a call is tried again after it has failed first: longer than another server needs to take a session over. */
 const PATIENCE_MS = 15_000;
 /** Methods that do no more the second time than the first: they read, or carry an id of their request. */
-const REPEATABLE = /^(Get|List|Query)[A-Z]|^(WhoAmI|DeformOnce|Fit|CreatePrediction)$/;
+const REPEATABLE = /^(Get|List|Query)[A-Z]|^(WhoAmI|DeformOnce|Fit|CreatePrediction|CreatePlanBuild)$/;
 /** Of these such as only look something up. */
 const QUICK = /^(Get|List|Query)[A-Z]|^WhoAmI$/;
 /** How long the first try of a quick call may take, and the second twice as long. */

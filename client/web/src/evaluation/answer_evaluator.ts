@@ -29,8 +29,8 @@ export interface EvaluatorExports {
   contact_forces(): number;
 }
 
-/** What an answer has beside positions: of every vertex the band in mm, or of every contact row that may lift off the force in N. */
-export type ValueKind = "band" | "contact";
+/** Of other poses than those of the hand: of every vertex its place or the band in mm, or of every contact row that may lift off the force in N. */
+export type ValueKind = "positions" | "band" | "contact";
 
 /** One Pa mm², in N. */
 const FORCE_UNIT_N = 1e-6;
@@ -115,9 +115,10 @@ export class AnswerEvaluator {
     return result;
   }
 
-  /** Of poses that need not be covered, in an array of the caller's; null where there are none: no such columns, poses that are none, for a band where one turns too far. */
+  /** In an array of the caller's; null where there are none: no such columns, poses that are none, for a band where one turns too far, for places that are not covered. */
   valuesAt(poses: readonly Pose[], kind: ValueKind): Float32Array | null {
     if (!this.setPoses(poses)) return null;
+    if (kind === "positions") return this.places();
     return kind === "band" ? (this.band()?.slice() ?? null) : this.contactForces();
   }
 
@@ -128,6 +129,13 @@ export class AnswerEvaluator {
       numbers.set([...rotationVector, ...pivotMm, ...translationMm, scale], POSE_NUMBERS * handle);
     });
     return true;
+  }
+
+  private places(): Float32Array | null {
+    if (this.exports.evaluate() === 0) return null;
+    const places = new Float32Array(this.result.positions.length);
+    this.copy(this.exports.positions(), places);
+    return places;
   }
 
   private band(): Float32Array | null {

@@ -8,6 +8,7 @@ import { evaluatorModule } from "../evaluation/evaluator_module";
 import type { Pose } from "../geometry/pose";
 import type { Vector } from "../geometry/rotation";
 import { type MovingData, writeMovingData } from "../movingdata/moving_data";
+import type { BoundPhotograph } from "../movingdata/photograph_data";
 import { LEAST_PASSWORD_LETTERS } from "../movingdata/password";
 import { TEMPLATE_FILE, fillTemplate } from "../movingdata/page_template";
 import { seal } from "../movingdata/sealed_payload";
@@ -21,10 +22,12 @@ export interface MovingPlan {
   model: string;
   /** Prepared answers of CaseFile.followed. */
   answers: Uint8Array<ArrayBuffer>;
+  /** Null: none in the file. */
+  photograph: BoundPhotograph | null;
 }
 
 /** The same as tissueform export takes of a plan: nothing that names anybody. */
-export function movingDataOf(file: CaseFile, { poses, model, answers }: MovingPlan): MovingData {
+export function movingDataOf(file: CaseFile, { poses, model, answers, photograph }: MovingPlan): MovingData {
   const { manifest } = file;
   // Answers know handles by their order in the session.
   const names = file.sessionRequest.handles.map(({ name }) => name);
@@ -37,6 +40,7 @@ export function movingDataOf(file: CaseFile, { poses, model, answers }: MovingPl
     handles: handles.map((handle) => ({ ...handle, pose: poseEntry(poses.get(handle.name), handle), isFree: true })),
     surfaces: file.surfaces.map(({ entry, positions, triangles, follows }) => ({ name: entry.name, kind: entry.kind, handle: entry.handle, positions, triangles, follows })),
     answers,
+    photograph,
   };
 }
 

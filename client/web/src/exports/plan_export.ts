@@ -3,7 +3,9 @@
 
 import * as three from "three";
 import { headAxes, toMove } from "../geometry/pose";
-import { type ShownFace, landmarkMovements, measureFace } from "../measures/face_measures";
+import type { MeasureResult } from "../measures/evaluation";
+import { intervalOf } from "../measures/texts";
+import { type ShownFace, landmarkMovements } from "../measures/face_measures";
 import type { DrawnSurface } from "../scene/head";
 import { type ShownAnswer, modelShown } from "../workbench/shown_answer";
 import type { StoredPredictions } from "../workbench/stored_predictions";
@@ -52,9 +54,10 @@ export type ToldPlan = ShownFace & Pick<Workbench, "answer" | "caseName" | "mode
 
 /**
  * A plan that `tissueform plan check` and `deform` take (docs/plan-format.md), with what the planner shows of it. Movements and
- * measures are of the plan's face, and left out while another one is shown. `ranges`: what plannedRanges gives.
+ * measures are of the plan's face, and left out while another one is shown. `results`: its measures. `ranges`: what plannedRanges
+ * gives.
  */
-export function planDocument(bench: ToldPlan, ranges: PlannedRanges = null): string {
+export function planDocument(bench: ToldPlan, results: readonly MeasureResult[], ranges: PlannedRanges = null): string {
   const { manifest, materialRanges } = bench.file;
   const poses = bench.plan.poses();
   const byHandle = new Map(bench.plan.handles.map(({ name }, index) => [name, poses[index]]));
@@ -77,7 +80,7 @@ export function planDocument(bench: ToldPlan, ranges: PlannedRanges = null): str
       move_about_plan_pivot: toMove(poses[index], handle.pivotMm, manifest.headFrame),
     })),
     measurement_landmarks: bench.landmarks.save(),
-    ...(bench.showsPlan ? { landmarks: movements(bench), measures: measures(bench), answer: answerFacts(bench.answer.value) } : {}),
+    ...(bench.showsPlan ? { landmarks: movements(bench), measures: measures(results), answer: answerFacts(bench.answer.value) } : {}),
     ...(leftOut.length === 0 ? {} : { left_out: leftOut.join("; ") }),
     predictions: bench.stored.all.value.map(({ name, title }) => ({ name, title })),
   };
@@ -94,11 +97,12 @@ function movements(bench: ToldPlan): object[] {
   }));
 }
 
-function measures(bench: ToldPlan): object[] {
-  return measureFace(bench).flatMap((result) => {
+function measures(results: readonly MeasureResult[]): object[] {
+  return results.flatMap((result) => {
     if (result.kind !== "value") return [];
     const { definition, before, after, band } = result;
-    return [{ name: definition.name, title: definition.title, unit: definition.unit, before, after, ...(band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest }) }];
+    const interval = band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest, interval_of: intervalOf(band) };
+    return [{ name: definition.name, title: definition.title, unit: definition.unit, before, after, ...interval }];
   });
 }
 

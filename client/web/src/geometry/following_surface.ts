@@ -55,7 +55,13 @@ export class FollowingSurface {
 
   /** `displacements`: three of each entry of the list, in mm. */
   move(displacements: Float32Array): void {
-    const { positions, rest, moving, places, weights } = this;
+    this.follow(displacements, this.positions);
+    this.updateNormals();
+  }
+
+  /** Where those that move would be, into `positions` (#V by 3). */
+  follow(displacements: Float32Array, positions: Float32Array): void {
+    const { rest, moving, places, weights } = this;
     for (let i = 0, k = 0; i < moving.length; ++i, k += 3) {
       const at = 3 * moving[i];
       const a = 3 * places[k], b = 3 * places[k + 1], c = 3 * places[k + 2];
@@ -64,7 +70,6 @@ export class FollowingSurface {
       positions[at + 1] = rest[at + 1] + u * displacements[a + 1] + v * displacements[b + 1] + w * displacements[c + 1];
       positions[at + 2] = rest[at + 2] + u * displacements[a + 2] + v * displacements[b + 2] + w * displacements[c + 2];
     }
-    this.updateNormals();
   }
 
   /** A number of each entry of the list, as `values` has it, laid upon the surface; 0 on what does not move. */

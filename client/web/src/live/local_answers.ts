@@ -101,6 +101,11 @@ export class LocalAnswers {
     this.host?.ask(poses, this.asked);
   }
 
+  /** Where every vertex is under other poses, mm; null where the page has no columns, or they do not cover the poses. */
+  positionsAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+    return this.host?.valuesAt(poses, "positions") ?? Promise.resolve(null);
+  }
+
   /** The band of other poses than those of the hand, of every vertex, mm; null where the columns know none. */
   bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
     return this.host?.valuesAt(poses, "band") ?? Promise.resolve(null);

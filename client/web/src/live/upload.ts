@@ -91,7 +91,7 @@ async function committedBytes(gateway: Gateway, name: string): Promise<number> {
 }
 
 /** The range in chunks whose offsets count from its beginning; stops where the server has answered. */
-async function sendChunks(
+export async function sendChunks(
   call: Pick<CallSocket<typeof CaseService.method.uploadCase>, "bufferedBytes" | "halfClose" | "isOver">,
   source: CaseSource,
   range: Range,

@@ -4,10 +4,20 @@
 import type { MeasureDefinition } from "./definitions";
 import type { FacePoint, FacePoints } from "./face_point";
 
-/** Of `after`: where it stays in 95 of 100 cases if nothing but the material is in doubt. */
+/** Of `after`: where it stays in 95 of 100 cases. */
 export interface Band {
   lowest: number;
   highest: number;
+  /** Surgery and model are in doubt, too; otherwise the material alone. */
+  parts?: BandParts;
+}
+
+/** Half the interval that each alone would cause. */
+export interface BandParts {
+  surgery: number;
+  model: number;
+  /** Null where it is not known. */
+  material: number | null;
 }
 
 /** A measure of one face, before and after. */

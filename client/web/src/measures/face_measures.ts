@@ -6,13 +6,13 @@ import type { CaseFile } from "../case/case_file";
 import { type Measure, MeasureSchema } from "../generated/tissueform/v1/export_service_pb";
 import { type Pose, movedPoint } from "../geometry/pose";
 import { pointAt } from "../geometry/rigid_fit";
-import { subtract } from "../geometry/rotation";
+import { type Vector, subtract } from "../geometry/rotation";
 import { type LandmarkMovement, isOnSkin, landmarkMovement } from "../planning/landmarks";
 import { type Anchor, anchorNumber, anchorPoint } from "./anchor";
 import { MEASURES } from "./definitions";
 import { type MeasureResult, evaluate } from "./evaluation";
 import { FACE_LANDMARKS } from "./face_landmarks";
-import { type FacePoint, faceFrame, hasHeadFrame, toFacePoint } from "./face_point";
+import { faceFrame, hasHeadFrame, toFacePoint } from "./face_point";
 import type { LandmarkBook } from "./landmark_book";
 import { ownDefinition } from "./own_measures";
 import { cutProfile, outline } from "./profile";
@@ -53,11 +53,16 @@ export function landmarkMovements(face: ShownFace): (LandmarkMovement & { bandMm
 
 /** All measures with what they are made of, as the face is shown. */
 export function measureFace(face: ShownFace): MeasureResult[] {
+  return measureAt(face, (_, anchor) => shownPoint(face, anchor));
+}
+
+/** The same where landmarks are at other places, LPS. */
+export function measureAt(face: ShownFace, placeOf: (name: string, anchor: Anchor) => Vector): MeasureResult[] {
   const { surfaces } = face.file;
   const frame = faceFrame(face.file);
-  const points = (at: (anchor: Anchor) => FacePoint) => new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, at(anchor)]));
-  const before = points((anchor) => toFacePoint(anchorPoint(surfaces[anchor.surface], anchor), frame));
-  const after = points((anchor) => toFacePoint(shownPoint(face, anchor), frame));
+  const points = (at: (name: string, anchor: Anchor) => Vector) => new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, toFacePoint(at(name, anchor), frame)]));
+  const before = points((_, anchor) => anchorPoint(surfaces[anchor.surface], anchor));
+  const after = points(placeOf);
   const own = face.landmarks.own.map((measure, index) => ownDefinition(measure, index, (name) => labelOf(face.landmarks, name)));
   const measured = { before, after, bandsMm: bandsMm(face), isMiddleKnown: hasHeadFrame(face.file) };
   return [...MEASURES, ...own].map((definition) => evaluate(definition, measured));
@@ -82,14 +87,13 @@ export function bandsMm(face: ShownFace): Map<string, number> | null {
   return bands.size === 0 ? null : bands;
 }
 
-/** Numbers of the plan for the PACS; none where the face that is shown is not the plan's: a comparison, or an open jaw. */
-export function collectMeasures(face: ShownFace): Measure[] {
-  if (!face.showsPlan) return [];
-  return measureFace(face).flatMap((result) => {
+/** Those that are known, for the PACS. */
+export function toMessages(results: readonly MeasureResult[]): Measure[] {
+  return results.flatMap((result) => {
     if (result.kind !== "value") return [];
     const { definition, before, after, band } = result;
-    const title = clip(definition.title);
-    return [create(MeasureSchema, { name: definition.name, title, unit: definition.unit, before, after, lowestAfter: band?.lowest, highestAfter: band?.highest })];
+    const interval = { lowestAfter: band?.lowest, highestAfter: band?.highest, intervalIsWhole: band?.parts !== undefined };
+    return [create(MeasureSchema, { name: definition.name, title: clip(definition.title), unit: definition.unit, before, after, ...interval })];
   });
 }
 

@@ -12,6 +12,19 @@ export function bandText(band: Band | null): string {
   return band === null ? "" : `${formatNumber(band.lowest)} to ${formatNumber(band.highest)}`;
 }
 
+/** What is in doubt: "surgery, model and material". */
+export function intervalOf({ parts }: Band): string {
+  if (parts === undefined) return "material";
+  return parts.material === null ? "surgery and model" : "surgery, model and material";
+}
+
+/** How wide each part alone is: "of this surgery 1.5, model 0.8, material 0.03"; "" where it is the material alone. */
+export function partsText(band: Band | null): string {
+  if (band?.parts === undefined) return "";
+  const { surgery, model, material } = band.parts;
+  return `of this surgery ${formatNumber(surgery)}, model ${formatNumber(model)}${material === null ? "" : `, material ${formatNumber(material, 2)}`}`;
+}
+
 /** Of a length, which is at least 0: "5.4 to 6.5". */
 export function lengthBand(valueMm: number, bandMm: number): string {
   return bandText({ lowest: Math.max(0, valueMm - bandMm), highest: valueMm + bandMm });

@@ -5,6 +5,8 @@ import { Field } from "../case/field";
 import { type HandleEntry, MAX_HANDLES, MAX_SURFACES, SURFACE_KINDS, type SurfaceKind, readHandle, readHeadFrame } from "../case/manifest";
 import type { Following } from "../geometry/following_surface";
 import type { HeadFrame } from "../geometry/pose";
+import type { BoundPhotograph } from "./photograph_data";
+import { type RowReader, MAX_PHOTOGRAPH_PARTS, readPhotographPart, writePhotographPart } from "./photograph_rows";
 import { packRows, unpackRows } from "./integer_rows";
 
 // What a file that moves holds before it is compressed: docs/moving-file.md. tissueform export writes the same.
@@ -38,6 +40,8 @@ export interface MovingData {
   surfaces: MovingSurface[];
   /** Prepared answers as they travel (docs/prepared-answers.md). */
   answers: Uint8Array<ArrayBuffer>;
+  /** Of the patient, where the user wants it in the file; null: none. */
+  photograph: BoundPhotograph | null;
 }
 
 const MAGIC = "TFMOVING";
@@ -47,7 +51,7 @@ const ALIGNMENT = 16;
 const STEPS_PER_MM = 2048;
 const WEIGHT_STEPS = 65535;
 const MOST_JSON_BYTES = 1 << 20;
-const MOST_PARTS = 4 * MAX_SURFACES + 1;
+const MOST_PARTS = 4 * MAX_SURFACES + 1 + MAX_PHOTOGRAPH_PARTS;
 const MOST_ROWS = 4_000_000;
 
 export const NOT_A_DEVICE = "not a medical device";
@@ -83,6 +87,7 @@ export function writeMovingData(data: MovingData): Uint8Array<ArrayBuffer> {
     handles: data.handles.map(handleToJson),
     surfaces,
     answers: add(data.answers),
+    ...(data.photograph === null ? {} : { photograph: writePhotographPart(data.photograph, add, addRows) }),
     parts: parts.map((part) => part.length),
   };
   return layOut(new TextEncoder().encode(JSON.stringify(json)), parts);
@@ -137,6 +142,7 @@ export function readMovingData(bytes: Uint8Array<ArrayBuffer>): MovingData {
     handles,
     surfaces: root.get("surfaces").list(MAX_SURFACES).map((field) => readSurface(field, names, part)),
     answers: part(root.get("answers")),
+    photograph: root.get("photograph").isPresent ? readPhotographPart(root.get("photograph"), part, rowsOf(part)) : null,
   };
 }
 
@@ -159,9 +165,11 @@ function openParts(bytes: Uint8Array<ArrayBuffer>): { root: Field; part: PartRea
   return { root, part: (field) => parts[field.integer(0, parts.length - 1)] };
 }
 
+const rowsOf = (part: PartReader): RowReader => (place, count) => unpackRows(part(place), count) ?? place.fail("as long as its numbers say");
+
 function readSurface(field: Field, handles: string[], part: PartReader): MovingSurface {
   const vertices = field.get("vertices").integer(1, MOST_ROWS);
-  const rows = (place: Field, count: number) => unpackRows(part(place), count) ?? place.fail("as long as its numbers say");
+  const rows = rowsOf(part);
   const triangles = Uint32Array.from(rows(field.get("corners"), field.get("triangles").integer(1, MOST_ROWS)));
   if (triangles.some((vertex) => vertex >= vertices)) field.get("corners").fail("of vertices that are there");
   const follows = field.get("follows");

@@ -5,6 +5,7 @@ import type { CaseSurface } from "../case/case_file";
 import { type LargestMovement, largestMovement, largestOf } from "../geometry/largest_movement";
 import type { Pose } from "../geometry/pose";
 import type { MovingData } from "../movingdata/moving_data";
+import { DrawnPhotograph } from "../photograph/drawn_photograph";
 import { Plan, type PlannedCase, posesOfCase } from "../planning/plan";
 import type { DrawnCase } from "../scene/head";
 import { HeadView } from "../scene/head_view";
@@ -30,6 +31,8 @@ export class MovingHead {
   readonly view: HeadView;
   /** Pictures shown so far. */
   answered = 0;
+  /** Null where the file has none. */
+  photograph: DrawnPhotograph | null = null;
   onShown: (shown: Shown | NotShown) => void = () => {};
 
   private readonly colors: FaceColors;
@@ -67,6 +70,7 @@ export class MovingHead {
     const isWithin = data.surfaces.every(({ follows }) => follows === null || follows.places.every((place) => place < count));
     if (atRest === null || !isWithin) throw new Error("the answers belong to another head than the surfaces");
     const head = new MovingHead(container, data, engine, Float32Array.from(atRest.positions), listener);
+    if (data.photograph !== null) head.photograph = await DrawnPhotograph.make(head.view.head, data.photograph);
     head.showShare(1);
     return head;
   }
@@ -92,6 +96,7 @@ export class MovingHead {
 
   setColored(isColored: boolean): void {
     this.isColored = isColored;
+    this.photograph?.setHidden(isColored);
     this.follow();
   }
 
@@ -110,6 +115,7 @@ export class MovingHead {
     const { head } = this.view;
     subtractInto(answer.positions, this.rest, this.displacements);
     head.setDisplacements(this.displacements);
+    this.photograph?.follow();
     this.view.setPoses(new Map(this.data.handles.map(({ name }, index) => [name, poses[index]])));
     let legend: MapLegend | null = null;
     if (this.isColored) legend = this.colors.showLengths("Movement of the skin", this.displacements);

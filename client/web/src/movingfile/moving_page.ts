@@ -64,7 +64,21 @@ function beforeAfter(head: MovingHead): HTMLElement {
     el("div", { class: "buttons" }, [button("Before", () => go(0)), button("Planned", () => go(1))]),
     between,
     el("label", { class: "check" }, [colored, "Color by skin movement"]),
+    head.photograph === null ? null : photographCheck(head),
   ]);
+}
+
+function photographCheck(head: MovingHead): HTMLElement {
+  const shown: HTMLInputElement = el("input", {
+    attributes: { type: "checkbox", checked: "" },
+    on: {
+      change: () => {
+        head.photograph?.setShown(shown.checked);
+        head.view.stage.invalidate();
+      },
+    },
+  });
+  return el("label", { class: "check" }, [shown, "Photograph"]);
 }
 
 function segmentSection(head: MovingHead, index: number): HTMLElement {

@@ -6,12 +6,14 @@ import type { Gateway } from "../calls/gateway";
 import { openCase } from "../case/case_file";
 import { fileSource, listCases, sha256Of } from "../case/case_sources";
 import type { Case } from "../generated/tissueform/v1/case_pb";
+import type { BuildDraft } from "../generated/tissueform/v1/plan_build_service_pb";
 import { uploadCase } from "../live/upload";
 import { formatBytes } from "../planning/numbers";
-import { el, newId } from "../panels/dom";
+import { button, el, newId } from "../panels/dom";
+import { draftsList } from "./drafts_list";
 
 /** The first page: the server's cases, and a place where a case file is dropped. */
-export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, account: HTMLElement | null): HTMLElement {
+export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, onNewPlan: (draft: BuildDraft | null) => void, account: HTMLElement | null): HTMLElement {
   const list = el("ul", { class: "cases" });
   const told = el("p", { class: "told", attributes: { role: "status" } });
   const problem = el("p", { class: "problem", attributes: { role: "alert" } });
@@ -41,6 +43,10 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, accou
       progress.hidden = true;
     }
   };
+  const newPlan = button("New plan from a CT", () => onNewPlan(null));
+  newPlan.hidden = true;
+  // A server that builds no plans answers with an error, and an older one, too: neither is told.
+  void gateway.planBuilds.listPlanBuilds({ pageSize: 1 }).then(() => (newPlan.hidden = false), () => {});
   void showList();
   return el("main", { class: "start" }, [
     el("div", { class: "sheet" }, [
@@ -49,6 +55,8 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, accou
       el("p", { class: "lead", text: "Move the bone, see the face follow." }),
       el("h2", { text: "Cases" }),
       list,
+      draftsList(gateway, onNewPlan, (text) => (problem.textContent = text)),
+      newPlan,
       dropZone((file) => void take(file)),
       told,
       progress,

@@ -13,11 +13,14 @@ import { legendBox, mapPanel, modelPanel } from "../panels/maps_panel";
 import { measuresPanel } from "../panels/measures_panel";
 import { movementsPanel } from "../panels/movements_panel";
 import { bindPicking, pickingBox } from "../panels/picking";
+import { photographPanel } from "../panels/photograph_panel";
 import { PictureBox } from "../panels/picture_box";
 import { predictionsPanel } from "../panels/predictions_panel";
 import { profilePanel } from "../panels/profile_panel";
 import { reportPanel } from "../panels/report_panel";
 import { segmentsPanel } from "../panels/segments_panel";
+import { sideBySideButton } from "../panels/side_by_side_button";
+import { slicesButton } from "../panels/slices_button";
 import { noticeBox, statusBar } from "../panels/status_bar";
 import { viewBar } from "../panels/view_bar";
 import { targetPanel } from "../panels/target_panel";
@@ -86,11 +89,15 @@ export function plannerPage(
     jawPanel(bench),
     modelPanel(bench, contactPart(bench, chooseContact)),
     mapPanel(bench),
+    photographPanel(bench),
     predictionsPanel(bench),
     exportPanel(bench),
     reportPanel(bench),
   ]);
-  const element = el("div", { class: "planner" }, [status.element, el("main", {}, [picture, legendBox(bench), viewBar(view)]), panel, help]);
+  const bar = viewBar(view);
+  const main = el("main", {}, [picture, legendBox(bench), bar]);
+  bar.append(slicesButton(bench, main), sideBySideButton(bench));
+  const element = el("div", { class: "planner" }, [status.element, main, panel, help]);
   return { element, bench };
 }
 

@@ -77,6 +77,32 @@ export async function whileBusy(control: HTMLButtonElement, run: () => Promise<v
   }
 }
 
+/** Shows `page` in place of all that is on the page, until the result is called. */
+export function coverPage(page: HTMLElement): () => void {
+  const others = Array.from(document.body.children).filter((element): element is HTMLElement => element instanceof HTMLElement && !element.hidden);
+  others.forEach((element) => (element.hidden = true));
+  document.body.append(page);
+  return () => {
+    page.remove();
+    others.forEach((element) => (element.hidden = false));
+  };
+}
+
+/** Replaces what is made again at each change: the keyboard's focus stays on the control of the same name, or goes to the first one. */
+export function renew(element: HTMLElement, children: readonly HTMLElement[]): void {
+  const focused = element.contains(document.activeElement) ? nameOf(document.activeElement) : null;
+  element.replaceChildren(...children);
+  if (focused === null) return;
+  const controls = [...element.querySelectorAll<HTMLElement>("button, input, select")];
+  const next = controls.find((control) => nameOf(control) === focused) ?? controls[0] ?? element;
+  if (next === element) element.tabIndex = -1;
+  next.focus();
+}
+
+function nameOf(element: Element | null): string {
+  return element?.getAttribute("aria-label") ?? element?.textContent ?? "";
+}
+
 export interface Choice<T> {
   value: T;
   label: string;

@@ -3,8 +3,10 @@
 
 import type { MoveKey } from "../geometry/pose";
 import type { GizmoMode } from "../scene/gizmo";
+import type { Plan } from "../planning/plan";
 import { VIEWS, type ViewName } from "../scene/views";
 import type { HeadView } from "../scene/head_view";
+import type { Stage } from "../scene/stage";
 import type { Workbench } from "../workbench/workbench";
 import { button, el } from "./dom";
 
@@ -41,7 +43,7 @@ const HELP: readonly [string, string][] = [
 ];
 
 /** Keys of the picture that turn the camera; true where `event` was one. */
-export function lookByKey(view: HeadView, event: KeyboardEvent): boolean {
+export function lookByKey(view: Pick<HeadView, "look"> & { stage: Pick<Stage, "orbit" | "zoom"> }, event: KeyboardEvent): boolean {
   if (event.ctrlKey || event.metaKey || event.altKey) return false;
   const named = (Object.keys(VIEWS) as ViewName[]).find((name) => VIEWS[name].key === event.key);
   if (named !== undefined) view.look(named);
@@ -86,15 +88,19 @@ export function bindKeys(bench: Workbench, help: HTMLDialogElement): void {
   };
   surface.addEventListener("keyup", finish);
   surface.addEventListener("blur", finish);
-  document.addEventListener("keydown", (event) => {
-    const isText = event.target instanceof HTMLInputElement && event.target.type === "text" && event.target.classList.contains("editing");
-    if (!(event.ctrlKey || event.metaKey) || isText) return;
-    const key = event.key.toLowerCase();
-    if (key === "z" && !event.shiftKey) bench.plan.undo();
-    else if (key === "y" || (key === "z" && event.shiftKey)) bench.plan.redo();
-    else return;
-    event.preventDefault();
-  });
+  document.addEventListener("keydown", (event) => undoByKey(bench.plan, event));
+}
+
+/** Undo and redo, but in a field of text that is being edited; true where `event` was one of them. */
+export function undoByKey(plan: Pick<Plan, "undo" | "redo">, event: KeyboardEvent): boolean {
+  const isText = event.target instanceof HTMLInputElement && event.target.type === "text" && event.target.classList.contains("editing");
+  if (!(event.ctrlKey || event.metaKey) || isText) return false;
+  const key = event.key.toLowerCase();
+  if (key === "z" && !event.shiftKey) plan.undo();
+  else if (key === "y" || (key === "z" && event.shiftKey)) plan.redo();
+  else return false;
+  event.preventDefault();
+  return true;
 }
 
 /** The keys in a dialog. */

@@ -7,7 +7,7 @@ import { VIRIDIS, colorTable } from "../geometry/color_map";
 import { formatNumber } from "../planning/numbers";
 import type { LocalState } from "../live/local_answers";
 import type { MapLegend, ShownLegend } from "../workbench/face_colors";
-import type { MapChoice } from "../workbench/face_map";
+import type { FaceMap, MapChoice } from "../workbench/face_map";
 import { describeFace } from "../workbench/shown_answer";
 import type { Workbench } from "../workbench/workbench";
 import { type Choice, button, el, newId, throttleToFrame, section, select } from "./dom";
@@ -126,7 +126,7 @@ function isSame(a: MapChoice, b: MapChoice): boolean {
 const BAR_WIDTH = 256;
 
 /** The legend over the picture, of the skin's map or of the bite: title, colors, range in mm. */
-export function legendBox(bench: Workbench): HTMLElement {
+export function legendBox(bench: Pick<Workbench, "bite"> & { map: Pick<FaceMap, "legend"> }): HTMLElement {
   const bar = el("canvas", { attributes: { width: String(BAR_WIDTH), height: "1", role: "img", "aria-label": "Color range" } });
   drawBar(bar);
   const title = el("strong");
@@ -152,9 +152,9 @@ function mapLegend(legend: MapLegend | null): ShownLegend | null {
   return legend === null ? null : { title: legend.title, ticksMm: [0, legend.mostMm / 2, legend.mostMm], note: largestText(legend) };
 }
 
-/** "largest 8.12 mm, 95 % interval 7.50 to 8.80", the second where it is known. */
+/** "largest 8.12 mm, 95 % interval (stiffness only) 7.50 to 8.80", the second where it is known. */
 export function largestText({ largestMm, band }: Pick<MapLegend, "largestMm" | "band">): string {
-  const range = band === null ? "" : `, 95 % interval ${formatNumber(band.lowestMm, 2)} to ${formatNumber(band.highestMm, 2)}`;
+  const range = band === null ? "" : `, 95 % interval (stiffness only) ${formatNumber(band.lowestMm, 2)} to ${formatNumber(band.highestMm, 2)}`;
   return `largest ${formatNumber(largestMm, 2)} mm${range}`;
 }
 

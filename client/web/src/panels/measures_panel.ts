@@ -4,7 +4,8 @@
 import { hasHeadFrame } from "../measures/face_point";
 import { labelOf, measureFace } from "../measures/face_measures";
 import type { MeasureResult } from "../measures/evaluation";
-import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
+import { measureAtRest } from "../measures/rest_measures";
+import { bandText, normText, partsText, unitText, valueTexts, whyNot } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
 import { collapsible, el, throttleToFrame } from "./dom";
 import { landmarksPart } from "./landmarks_part";
@@ -17,11 +18,24 @@ export function measuresPanel(bench: Workbench): HTMLElement {
   const caption = el("caption");
   const table = el("table", { class: "measures" }, [caption, el("thead", {}, [el("tr", {}, heads)]), body]);
   const landmarks = landmarksPart(bench);
-  const show = () => {
-    if (!panel.open) return;
-    const results = measureFace(bench);
+  let resting: ReturnType<typeof setTimeout> | undefined;
+  let shownCount = 0;
+  const draw = (results: readonly MeasureResult[]) => {
     body.replaceChildren(...results.map((result) => row(bench, result)));
     caption.textContent = captionOf(bench, results);
+  };
+  const drawAtRest = async () => {
+    const asked = shownCount;
+    const results = await measureAtRest(bench, bench.planAnswers);
+    if (asked === shownCount) draw(results);
+  };
+  const show = () => {
+    shownCount += 1;
+    clearTimeout(resting);
+    if (!panel.open) return;
+    draw(measureFace(bench));
+    // A band that cannot be found leaves that of the material.
+    if (bench.showsPlan) resting = setTimeout(() => void drawAtRest().catch(() => {}), REST_MS);
   };
   const panel: HTMLDetailsElement = collapsible("Measures", [table, landmarks.element, ownMeasuresPart(bench)], (isOpen) => {
     landmarks.show(isOpen);
@@ -32,28 +46,33 @@ export function measuresPanel(bench: Workbench): HTMLElement {
   return panel;
 }
 
+/** The hand rests: the band takes some dozens of answers. */
+const REST_MS = 400;
+
 function captionOf(bench: Workbench, results: readonly MeasureResult[]): string {
-  const hasBand = results.some((result) => result.kind === "value" && result.band !== null);
+  const bands = results.flatMap((result) => (result.kind === "value" && result.band !== null ? [result.band] : []));
+  const [hasBand, isWhole] = [bands.length > 0, bands.some(({ parts }) => parts !== undefined)];
   return [
     `In the ${hasHeadFrame(bench.file) ? "head frame" : "scanner axes (no head frame was found)"}; forward, up and the patient’s left are positive.`,
-    hasBand ? "Below “after”: 95 % interval, material uncertainty only." : "",
-    bench.hasBand && bench.whyNoBand !== "" ? `No 95 % interval: ${bench.whyNoBand}.` : "",
+    isWhole ? "Below “after”: where 95 of 100 patients will be if surgery and model err as published, and the material as the case states. Below a name: how far each of them alone would reach." : "",
+    hasBand && !isWhole ? "Below “after”: 95 % interval, material uncertainty only." : "",
+    !isWhole && bench.hasBand && bench.whyNoBand !== "" ? `No 95 % interval: ${bench.whyNoBand}.` : "",
     bench.showsPlan ? "" : `The face that is shown is not the plan’s${hasBand ? "" : "; it has no 95 % interval"}.`,
   ].filter((text) => text !== "").join(" ");
 }
 
 function row(bench: Workbench, result: MeasureResult): HTMLElement {
   const { definition } = result;
-  const norm = normText(definition.norm);
-  const name = el("th", { attributes: { scope: "row" } }, [`${definition.title}, ${unitText(result)}`, norm === "" ? null : el("small", { text: norm })]);
+  const band = result.kind === "value" ? result.band : null;
+  const remarks = [normText(definition.norm), partsText(band)].filter((text) => text !== "").map((text) => el("small", { text }));
+  const name = el("th", { attributes: { scope: "row" } }, [`${definition.title}, ${unitText(result)}`, ...remarks]);
   const why = whyNot(result, (landmark) => labelOf(bench.landmarks, landmark));
   if (why !== "") return el("tr", { attributes: { "data-measure": definition.name } }, [name, el("td", { class: "quiet", text: why, attributes: { colspan: "3" } })]);
   const [before, after, change] = valueTexts(result);
-  const band = result.kind === "value" ? bandText(result.band) : "";
   return el("tr", { attributes: { "data-measure": definition.name } }, [
     name,
     el("td", { text: before }),
-    el("td", {}, [after, band === "" ? null : el("small", { class: "band", text: band })]),
+    el("td", {}, [after, band === null ? null : el("small", { class: "band", text: bandText(band) })]),
     el("td", { text: change }),
   ]);
 }

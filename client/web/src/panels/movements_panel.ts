@@ -36,7 +36,7 @@ export function movementsPanel(bench: Workbench): HTMLElement {
       const plusMinus = bandMm === null ? "" : `± ${formatNumber(bandMm)}`;
       [movement.forwardMm, movement.leftMm, movement.upMm].forEach((value, column) => fill(cells[column], cell(value), plusMinus));
       fill(cells[3], cell(movement.totalMm), bandMm === null ? "" : lengthBand(movement.totalMm, bandMm));
-      row.title = `${describeMovement(movement)}${bandMm === null ? "" : `, 95 % interval ${plusMinus} mm`}`;
+      row.title = `${describeMovement(movement)}${bandMm === null ? "" : `, 95 % interval (stiffness only) ${plusMinus} mm`}`;
     });
   };
   bench.shown.watch(throttleToFrame(show));

@@ -15,13 +15,19 @@ export function movingFilePart(bench: Workbench): HTMLElement {
     id,
     attributes: { type: "password", autocomplete: "new-password", maxlength: "256", placeholder: `none, or at least ${LEAST_PASSWORD_LETTERS} letters` },
   });
+  const photograph = el("input", { attributes: { type: "checkbox" } });
+  const choice = el("label", { class: "check" }, [photograph, "Include the photograph: it identifies the patient"]);
+  bench.photograph.watch((bound) => {
+    choice.hidden = bound === null;
+    photograph.checked &&= bound !== null;
+  });
   const make = async () => {
     const answers = bench.local.heldColumns;
     if (answers === null) throw new Error("a moving file needs the model's columns in this page: choose a model with prepared answers, and wait until they are loaded");
     const model = bench.modelInfo(bench.model.value)?.name ?? "";
     const poses = bench.posesByHandle(bench.plan.poses());
     const { movingFile } = await pagePart(() => import("../exports/moving_export"));
-    download("tissueform-moves.html", await movingFile(bench.file, { poses, model, answers }, password.value));
+    download("tissueform-moves.html", await movingFile(bench.file, { poses, model, answers, photograph: photograph.checked ? bench.photograph.value : null }, password.value));
     password.value = "";
   };
   const save: HTMLButtonElement = button("Moving file", () => {
@@ -29,6 +35,7 @@ export function movingFilePart(bench: Workbench): HTMLElement {
   });
   return el("div", { class: "moving-part" }, [
     el("div", { class: "field" }, [el("label", { text: "Password", attributes: { for: id } }), password]),
+    choice,
     save,
     el("p", { class: "quiet", text: "One page with this plan that works without a server. This file shows an identifiable face. Handle it like a patient photograph; a password encrypts it." }),
   ]);

@@ -16,6 +16,7 @@ export function bindPicking(bench: Workbench): void {
   const { surface } = bench.view.stage;
   const take = (x: number, y: number) => {
     const picking = bench.picking.value;
+    if (picking?.takeAt !== undefined) return picking.takeAt(x, y);
     picking?.take(bench.view.anchorAt(x, y, picking.kinds));
   };
   let from: [number, number] | null = null;

@@ -28,7 +28,7 @@ export class PictureBox {
   constructor(private readonly onContext: (isLost: boolean) => void) {}
 
   /** `label`: what the picture is and how it is turned, for those who do not see it. */
-  dress({ stage }: HeadView, label: string): void {
+  dress({ stage }: Pick<HeadView, "stage">, label: string): void {
     stage.surface.setAttribute("aria-label", label);
     stage.surface.setAttribute("role", "application");
     const marks = pictureMarks(stage);
@@ -36,16 +36,19 @@ export class PictureBox {
     const lost = lostBox(stage);
     this.showLost = lost.show;
     this.element.append(marks.element, lost.element);
-    if (!stage.hasRenderer) {
-      const text = "This browser shows no 3D pictures (WebGL is off or missing). Everything else works.";
-      this.element.append(el("p", { class: "no-picture", text, attributes: { role: "alert" } }));
-    }
+    if (!stage.hasRenderer) this.element.append(noPicture());
     marks.update();
   }
 }
 
+/** In place of a picture that the browser cannot draw. */
+export function noPicture(): HTMLElement {
+  const text = "This browser shows no 3D pictures (WebGL is off or missing). Everything else works.";
+  return el("p", { class: "no-picture", text, attributes: { role: "alert" } });
+}
+
 /** Over a picture that the browser has stopped: why, and the way to go on. */
-function lostBox(stage: Stage): { element: HTMLElement; show(isLost: boolean): void } {
+export function lostBox(stage: Pick<Stage, "restore">): { element: HTMLElement; show(isLost: boolean): void } {
   const text = el("span");
   const restore = button("Restore picture", () => void whileBusy(restore, () => stage.restore(), (thrown) => (text.textContent = messageOf(thrown))));
   const element = el("div", { class: "no-picture", attributes: { role: "alert" } }, [el("p", {}, [text]), restore]);

@@ -5,7 +5,7 @@ import { messageOf } from "../calls/call_error";
 import { download } from "../exports/files";
 import { pagePart } from "./page_part";
 import type { Workbench } from "../workbench/workbench";
-import { button, collapsible, el, whileBusy } from "./dom";
+import { button, collapsible, coverPage, el, whileBusy } from "./dom";
 
 /** One page for the patient's file: looked at, printed by the browser (to paper or PDF), or kept as a file. */
 export function reportPanel(bench: Workbench): HTMLElement {
@@ -20,13 +20,8 @@ export function reportPanel(bench: Workbench): HTMLElement {
   return collapsible("Report", [el("p", { class: "quiet", text }), el("div", { class: "buttons" }, [open])]);
 }
 
-/** Over the planner until it is closed; what else is on the page is not printed. */
+/** What else is on the page is not printed. */
 function showReport(sheet: HTMLElement): void {
-  const others = Array.from(document.body.children).filter((element): element is HTMLElement => element instanceof HTMLElement && !element.hidden);
-  const close = () => {
-    page.remove();
-    others.forEach((element) => (element.hidden = false));
-  };
   // The planner's own line of words lies below the report.
   const told = el("p", { attributes: { role: "alert" } });
   const save = async () => {
@@ -34,10 +29,9 @@ function showReport(sheet: HTMLElement): void {
     download("tissueform-report.html", new Blob([await reportFile(sheet)], { type: "text/html" }));
   };
   const html = button("Report HTML", () => void whileBusy(html, save, (thrown) => (told.textContent = messageOf(thrown))));
-  const buttons = [button("Print or save as PDF", () => print()), html, button("Back to the plan", close)];
+  const buttons = [button("Print or save as PDF", () => print()), html, button("Back to the plan", () => close())];
   const page = el("main", { class: "report-page", attributes: { "aria-label": "Report" } }, [el("div", { class: "buttons" }, [...buttons, told]), sheet]);
   page.addEventListener("keydown", (event) => event.key === "Escape" && close());
-  others.forEach((element) => (element.hidden = true));
-  document.body.append(page);
+  const close = coverPage(page);
   buttons[0].focus();
 }

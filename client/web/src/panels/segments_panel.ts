@@ -5,6 +5,7 @@ import { type MoveKey } from "../geometry/pose";
 import { type Unit, formatNumber, parseNumber } from "../planning/numbers";
 import { pivotChoices } from "../planning/pivots";
 import { MOVE_KEYS } from "../planning/plan";
+import type { Head } from "../scene/head";
 import { cssColor, segmentColor } from "../scene/materials";
 import type { Workbench } from "../workbench/workbench";
 import { posesOfCase } from "../planning/plan";
@@ -16,7 +17,7 @@ interface RowText {
   unit: Unit;
 }
 
-const ROWS: Record<MoveKey, RowText> = {
+export const MOVE_TEXTS: Record<MoveKey, RowText> = {
   forwardMm: { label: "Forward", hint: "− back", unit: "mm" },
   leftMm: { label: "Left", hint: "− right", unit: "mm" },
   upMm: { label: "Up", hint: "− down", unit: "mm" },
@@ -28,8 +29,11 @@ const ROWS: Record<MoveKey, RowText> = {
 const STEP = 0.5;
 const SMALL_STEP = 0.1;
 
+/** Whose segments are moved: the planner's, or those of another plan of the case. */
+export type SegmentsOwner = Pick<Workbench, "plan" | "file" | "selected" | "notice" | "penetrations"> & { view: { head: Pick<Head, "segmentMiddle"> } };
+
 /** Which segment is in the hand, and its move in six numbers: typed, by slider or by arrow keys. */
-export function segmentsPanel(bench: Workbench): HTMLElement {
+export function segmentsPanel(bench: SegmentsOwner): HTMLElement {
   const { plan } = bench;
   const undo = button("Undo", () => plan.undo(), { attributes: { title: "Ctrl+Z" } });
   const redo = button("Redo", () => plan.redo(), { attributes: { title: "Ctrl+Y" } });
@@ -49,7 +53,7 @@ export function segmentsPanel(bench: Workbench): HTMLElement {
   ]);
 }
 
-function segmentList(bench: Workbench): HTMLElement {
+function segmentList(bench: SegmentsOwner): HTMLElement {
   const items = bench.plan.handles.map((handle, index) => {
     const swatch = el("span", { class: "swatch" });
     swatch.style.background = cssColor(segmentColor(index));
@@ -60,8 +64,8 @@ function segmentList(bench: Workbench): HTMLElement {
   return el("div", { class: "segments", attributes: { role: "group", "aria-label": "Segment" } }, items);
 }
 
-function moveRow(bench: Workbench, key: MoveKey): HTMLElement {
-  const { label, hint, unit } = ROWS[key];
+function moveRow(bench: SegmentsOwner, key: MoveKey): HTMLElement {
+  const { label, hint, unit } = MOVE_TEXTS[key];
   const id = newId("move");
   const number = el("input", { id, attributes: { type: "text", inputmode: "decimal", autocomplete: "off", "aria-describedby": `${id}-hint` } });
   const slider = el("input", { attributes: { type: "range", step: String(SMALL_STEP), "aria-label": `${label} by slider` } });
@@ -110,7 +114,7 @@ function moveRow(bench: Workbench, key: MoveKey): HTMLElement {
   return el("div", { class: "move" }, [text, slider, number, el("span", { class: "unit", text: unit })]);
 }
 
-function pivotField(bench: Workbench): HTMLElement {
+function pivotField(bench: SegmentsOwner): HTMLElement {
   const choices = () => {
     const handle = bench.plan.handles[bench.selected.value];
     return pivotChoices(handle, bench.file.manifest.landmarks, bench.view.head.segmentMiddle(handle.name));
@@ -128,7 +132,7 @@ function pivotField(bench: Workbench): HTMLElement {
   return field.element;
 }
 
-function penetrationText(bench: Workbench): HTMLElement {
+function penetrationText(bench: SegmentsOwner): HTMLElement {
   const text = el("p", { class: "warning", attributes: { role: "status" } });
   bench.penetrations.watch((found) => {
     text.hidden = found.length === 0;

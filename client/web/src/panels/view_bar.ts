@@ -8,8 +8,11 @@ import type { Stage } from "../scene/stage";
 import { VIEWS, type ViewName, edgeLetters, scaleBar } from "../scene/views";
 import { button, el, select, slider } from "./dom";
 
+/** What is looked at: one head, or several by one camera. */
+export type LookedAt = Pick<HeadView, "look" | "setGhost" | "setSkinOpacity" | "setCut"> & { head: { radius: number } };
+
 /** How the head is looked at: views, transparency, cut, ghost. */
-export function viewBar(view: HeadView): HTMLElement {
+export function viewBar(view: LookedAt): HTMLElement {
   const views = (Object.keys(VIEWS) as ViewName[]).map((name) =>
     button(VIEWS[name].label, () => view.look(name), { attributes: { title: `Key ${VIEWS[name].key}` } }),
   );
@@ -27,7 +30,7 @@ export function viewBar(view: HeadView): HTMLElement {
   ]);
 }
 
-function cutField(view: HeadView): HTMLElement {
+function cutField(view: LookedAt): HTMLElement {
   let axis: Cut["axis"] | null = null;
   const reach = Math.ceil(view.head.radius);
   const at = slider("Place of the cut", { least: -reach, most: reach, step: 1, value: 0 }, () => show());
@@ -53,7 +56,7 @@ function cutField(view: HeadView): HTMLElement {
 }
 
 /** Letters at the edges of the picture and a bar of so many mm; call `update` when the camera has moved. */
-export function pictureMarks(stage: Stage): { element: HTMLElement; update(): void } {
+export function pictureMarks(stage: Pick<Stage, "camera" | "millimetresPerPixel">): { element: HTMLElement; update(): void } {
   const letters = {
     left: el("span", { class: "letter at-left" }),
     right: el("span", { class: "letter at-right" }),

@@ -32,14 +32,21 @@ interface State {
 export class Plan {
   readonly handles: readonly HandleEntry[];
   private readonly history: History<State>;
-  private state: State;
   private isPreview = false;
   private readonly listeners: PlanListener[] = [];
 
-  constructor(private readonly file: PlannedCase) {
+  /** `state`: where it begins; left out: at rest, about the case's pivots. */
+  constructor(
+    private readonly file: PlannedCase,
+    private state: State = { moves: file.manifest.handles.map(() => ({ ...NO_MOVE })), pivots: file.manifest.handles.map((handle) => handle.pivotMm) },
+  ) {
     this.handles = file.manifest.handles;
-    this.state = { moves: this.handles.map(() => ({ ...NO_MOVE })), pivots: this.handles.map((handle) => handle.pivotMm) };
-    this.history = new History(this.state);
+    this.history = new History(state);
+  }
+
+  /** Another plan, which begins with these poses, or those of this plan, about the same pivots. */
+  fork(poses?: ReadonlyMap<string, Pose>): Plan {
+    return new Plan(this.file, { ...this.state, moves: poses === undefined ? this.moves : this.movesOf(poses) });
   }
 
   get moves(): Moves {

@@ -4,8 +4,10 @@
 import { NOTICE } from "../exports/files";
 import { provenanceLines } from "../exports/plan_export";
 import { ProfileDrawing } from "../exports/profile_svg";
-import { labelOf, measureFace } from "../measures/face_measures";
-import { bandText, normText, unitText, valueTexts, whyNot } from "../measures/texts";
+import type { MeasureResult } from "../measures/evaluation";
+import { labelOf } from "../measures/face_measures";
+import { measureAtRest } from "../measures/rest_measures";
+import { bandText, intervalOf, normText, unitText, valueTexts, whyNot } from "../measures/texts";
 import { formatNumber } from "../planning/numbers";
 import { pivotChoices, pivotText } from "../planning/pivots";
 import { MOVE_KEYS } from "../planning/plan";
@@ -32,14 +34,15 @@ function table(heads: readonly string[], rows: readonly (readonly (Node | string
 
 /** The sheet of what is shown now. Its pictures are `data:` addresses, so that it is whole wherever it is kept. */
 export async function reportSheet(bench: Workbench): Promise<HTMLElement> {
+  const results = await measureAtRest(bench, bench.planAnswers);
   const pictures = await reportPictures(bench);
   return node("article", [
     node("header", [node("h1", ["Surgical plan and predicted face"]), node("p", [`${NOTICE[0].toUpperCase()}${NOTICE.slice(1)}: a prediction by a model, not for diagnosis or treatment.`], "report-notice")]),
     node("section", [node("h2", ["Plan"]), planTable(bench)]),
-    node("section", [node("h2", ["Measures"]), measureTable(bench)], "wide"),
+    node("section", [node("h2", ["Measures"]), measureTable(bench, results)], "wide"),
     node("section", [node("h2", ["Profile"]), new ProfileDrawing(bench).draw()]),
     node("section", [node("h2", ["Pictures"]), node("div", pictures, "pictures")]),
-    node("section", [node("h2", ["Origin"]), facts(bench)], "wide"),
+    node("section", [node("h2", ["Origin"]), facts(bench, results)], "wide"),
   ], "report");
 }
 
@@ -52,8 +55,8 @@ function planTable(bench: Workbench): HTMLElement {
   return table(["Segment", ...MOVE_KEYS.map((key) => HEADS[key]), "Of and about (at rest, LPS, mm)"], rows);
 }
 
-function measureTable(bench: Workbench): HTMLElement {
-  const rows = measureFace(bench).map((result) => {
+function measureTable(bench: Workbench, results: readonly MeasureResult[]): HTMLElement {
+  const rows = results.map((result) => {
     const why = whyNot(result, (name) => labelOf(bench.landmarks, name));
     const [before, after, change] = valueTexts(result);
     const band = result.kind === "value" ? bandText(result.band) : "";
@@ -70,11 +73,19 @@ export function answerLine(bench: Pick<Workbench, "comparison" | "model" | "mode
   return `model ${model}. ${describeFace(answer, comparison) || "No answer yet."}${isOwn ? " Computed by the page; not yet confirmed by the server." : ""}`;
 }
 
-function facts(bench: Workbench): HTMLElement {
+/** What the intervals of the measures hold, or why there are none. */
+export function intervalLine(results: readonly MeasureResult[], why: string): string {
+  const bands = results.flatMap((result) => (result.kind === "value" && result.band !== null ? [result.band] : []));
+  const whole = bands.find(({ parts }) => parts !== undefined);
+  if (whole !== undefined) return `95 % interval: ${intervalOf(whole)} together, with published deviations of surgery and model`;
+  return bands.length > 0 || why === "" ? "95 % interval, material uncertainty only; excludes model and surgical error" : `no 95 % interval: ${why}`;
+}
+
+function facts(bench: Workbench, results: readonly MeasureResult[]): HTMLElement {
   const lines = [
     `made ${new Date().toISOString()}`,
     answerLine(bench),
-    bench.whyNoBand === "" ? "95 % interval, material uncertainty only; excludes model and surgical error" : `no 95 % interval: ${bench.whyNoBand}`,
+    intervalLine(results, bench.whyNoBand),
     "mm and degrees in the head frame: forward, up and the patient's left are positive",
     ...provenanceLines(bench).filter((line) => !line.startsWith("model")),
   ];

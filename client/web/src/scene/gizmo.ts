@@ -10,6 +10,9 @@ import type { Stage } from "./stage";
 
 export type GizmoMode = "translate" | "rotate";
 
+/** Where LPS lies in the stage. */
+export type StageSpace = Pick<Head, "worldAxes" | "middle" | "toWorld">;
+
 // TransformControls of size 1 has a unit of this part of the picture's height. Its arms are taken 0.6 units from the middle, where they
 // are 0.4 units wide: at least 44 pixels, for a finger.
 const UNIT_OF_HEIGHT = 1.9 / 8;
@@ -31,7 +34,7 @@ export class Gizmo {
   /** `onPose`: the segment is pulled there; `isFinal` when the hand lets go. */
   constructor(
     private readonly stage: Stage,
-    private readonly head: Head,
+    private readonly head: StageSpace,
     onPose: (pose: Pose, isFinal: boolean) => void,
   ) {
     this.controls = new TransformControls(stage.camera, stage.surface);

@@ -7,6 +7,9 @@ import * as three from "three";
 const RESTORE_MS = 1500;
 const NOT_BACK = "The browser does not restore the graphics card, so there is no picture: reload the page";
 
+/** How a camera's picture is put onto the canvas where it is drawn more than once. */
+export type DrawPanes = (renderer: three.WebGLRenderer, scene: three.Scene, camera: three.Camera) => void;
+
 /**
  * The renderer and the canvas that it draws on, which the browser may take away at any time. The canvas fills `surface`; what listens
  * to pointers and keys listens to `surface`, because a lost canvas may be replaced.
@@ -23,10 +26,11 @@ export class Graphics {
   private whenBack: (() => void)[] = [];
   private frame = { width: 1, height: 1, pixelRatio: 1 };
 
-  /** `onContext`: the context was lost, or is back. */
+  /** `onContext`: the context was lost, or is back. `drawPanes`: null draws once over all of the canvas. */
   constructor(
     private readonly surface: HTMLElement,
     private readonly onContext: (isLost: boolean) => void,
+    private readonly drawPanes: DrawPanes | null = null,
   ) {
     this.canvas = document.createElement("canvas");
     this.renderer = createRenderer(this.canvas);
@@ -47,7 +51,8 @@ export class Graphics {
   /** False where nothing was drawn. */
   render(scene: three.Scene, camera: three.Camera): boolean {
     if (this.renderer === null || this.isLost) return false;
-    this.renderer.render(scene, camera);
+    if (this.drawPanes === null) this.renderer.render(scene, camera);
+    else this.drawPanes(this.renderer, scene, camera);
     return !this.isLost;
   }
 
@@ -60,11 +65,15 @@ export class Graphics {
     this.renderer.setSize(width, height, false);
     this.render(scene, camera);
     copy.getContext("2d")?.drawImage(this.canvas, 0, 0);
-    // Reading a pixel waits for the graphics card: a loss that happened while it drew is known after this.
-    const context = this.renderer.getContext();
-    context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));
+    this.finish();
     this.setFrame(this.frame.width, this.frame.height, this.frame.pixelRatio);
     return this.isLost ? null : copy;
+  }
+
+  /** Waits for the graphics card: a loss that happened while it drew is known after this. */
+  finish(): void {
+    const context = this.renderer?.getContext();
+    context?.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   /** Resolves at once where nothing is lost; rejects with an Error where the browser gives no context. */
@@ -72,6 +81,14 @@ export class Graphics {
     if (!this.isLost) return Promise.resolve();
     this.restoring ??= this.bringBack().finally(() => (this.restoring = null));
     return this.restoring;
+  }
+
+  /** Frees the context at once: browsers take the oldest one away where a page has many. Nothing is drawn afterwards. */
+  dispose(): void {
+    const { renderer } = this;
+    this.renderer = null;
+    renderer?.dispose();
+    renderer?.forceContextLoss();
   }
 
   private async bringBack(): Promise<void> {
@@ -106,7 +123,7 @@ export class Graphics {
     // The context gives out its extensions only while it is not lost.
     this.lossExtension = this.renderer?.getContext().getExtension("WEBGL_lose_context") ?? null;
     canvas.addEventListener("webglcontextlost", () => {
-      if (canvas !== this.canvas) return;
+      if (canvas !== this.canvas || this.renderer === null) return;
       this.isReported = true;
       // The browser restores a context only after every listener has heard of the loss.
       if (this.restoring !== null) setTimeout(() => this.endLoss());

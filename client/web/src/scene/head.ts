@@ -278,6 +278,7 @@ const LINEAR = Float32Array.from({ length: 256 }, (_, value) => {
   return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
 });
 
-function toLinear(colors: Uint8Array, out: Float32Array): void {
+/** Bytes of sRGB as linear numbers, 0 to 1. */
+export function toLinear(colors: Uint8Array, out: Float32Array): void {
   for (let i = 0; i < out.length; ++i) out[i] = LINEAR[colors[i]];
 }

@@ -3,7 +3,7 @@
 
 import * as three from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { Graphics } from "./graphics";
+import { type DrawPanes, Graphics } from "./graphics";
 
 const FIELD_OF_VIEW_DEG = 22;
 /** Of half the field of view. */
@@ -35,6 +35,13 @@ export interface PictureSize {
   height: number;
 }
 
+/** Several pictures by one camera, side by side on one canvas. */
+export interface Panes {
+  /** Of each of them, in pixels of the page. */
+  size(): PictureSize;
+  draw: DrawPanes;
+}
+
 /**
  * The picture: camera, lights, orbit. It is drawn only when something asks for it by `invalidate`. Where the browser has no WebGL
  * there is no renderer; everything else works.
@@ -57,10 +64,13 @@ export class Stage {
   private span = 1;
   private readonly graphics: Graphics;
   private readonly keyLight = new three.DirectionalLight(0xfff6ee, 2.0);
+  private readonly resizes = new ResizeObserver(() => this.resize());
 
+  /** `panes`: null shows one picture, which fills `container`. */
   constructor(
     private readonly container: HTMLElement,
     private readonly listener: StageListener,
+    private readonly panes: Panes | null = null,
   ) {
     this.surface = document.createElement("div");
     this.surface.className = "surface";
@@ -69,14 +79,14 @@ export class Stage {
     this.graphics = new Graphics(this.surface, (isLost) => {
       this.listener.onContext(isLost);
       this.invalidate();
-    });
+    }, panes?.draw);
     this.controls = new OrbitControls(this.camera, this.surface);
     this.controls.enableDamping = false;
     this.controls.minDistance = 60;
     this.controls.maxDistance = 3000;
     this.controls.addEventListener("change", () => this.invalidate());
     this.addLights();
-    new ResizeObserver(() => this.resize()).observe(container);
+    this.resizes.observe(container);
     this.resize();
   }
 
@@ -106,6 +116,14 @@ export class Stage {
     requestAnimationFrame(() => this.draw());
   }
 
+  /** Draws and waits for the graphics card: how long that took, in ms. */
+  drawNow(): number {
+    const begin = performance.now();
+    this.draw();
+    this.graphics.finish();
+    return performance.now() - begin;
+  }
+
   /** For measurements: without drawing everything else goes on. */
   setDrawing(isDrawing: boolean): void {
     this.isDrawing = isDrawing;
@@ -115,7 +133,7 @@ export class Stage {
   /** Millimetres that a pixel shows in the plane of the orbit's middle. */
   get millimetresPerPixel(): number {
     const height = 2 * this.camera.position.distanceTo(this.controls.target) * TANGENT;
-    return height / Math.max(1, this.container.clientHeight);
+    return height / Math.max(1, (this.panes?.size() ?? { height: this.container.clientHeight }).height);
   }
 
   /** Looks from `direction` at the middle, from where all of this reach is within the picture. */
@@ -220,11 +238,23 @@ export class Stage {
     if (this.fit !== before) this.zoom(before / this.fit);
   }
 
-  private resize(): void {
+  /** Frees the graphics card; the stage is of no use afterwards. */
+  dispose(): void {
+    this.resizes.disconnect();
+    this.controls.dispose();
+    this.graphics.dispose();
+    this.surface.remove();
+  }
+
+  /** Call it when panes are laid out differently; the container's own size is watched. */
+  resize(): void {
     const { clientWidth, clientHeight } = this.container;
+    const { width, height } = this.panes?.size() ?? { width: clientWidth, height: clientHeight };
     // While another page lies over this one it has no size, and keeps the one that it had.
-    if (clientWidth === 0 || clientHeight === 0) return;
-    this.setAspect(clientWidth / clientHeight);
+    if (width === 0 || height === 0) return;
+    this.setAspect(width / height);
+    // Controls measure by the height of the surface, which holds all panes.
+    this.controls.rotateSpeed = this.controls.panSpeed = clientHeight / height;
     this.graphics.setFrame(clientWidth, clientHeight, Math.min(MOST_PIXEL_RATIO, devicePixelRatio));
     this.invalidate();
   }

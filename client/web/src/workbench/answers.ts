@@ -6,6 +6,7 @@ import { toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import { firstAtPlace, keptCount } from "../case/sticking_case";
+import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import type { FitRequestSchema, FitResponse } from "../generated/tissueform/v1/plan_service_pb";
 import type { ReadPositionsResponse } from "../generated/tissueform/v1/prediction_service_pb";
@@ -35,11 +36,16 @@ export class Answers {
 
   /** Displacements of CaseFile.followed by `model` under `poses`. */
   async ofModel(session: string, model: DeformationModel, poses: Pose[]): Promise<Float32Array> {
+    return (await this.solve(session, model, poses)).displacements;
+  }
+
+  /** The same, with how good it is. */
+  async solve(session: string, model: DeformationModel, poses: Pose[]): Promise<{ displacements: Float32Array; summary: SolveSummary | null }> {
     const vertices = { selection: { case: "list" as const, value: { vertices: Array.from(this.file.followed) } } };
     const request = { session, model, poses: toMessages(this.names, poses), vertices };
     const options = { headers: sessionMetadata(session), timeoutMs: ANSWER_DEADLINE_MS };
-    const { positions } = await this.call(() => this.gateway.deform.deformOnce(request, options));
-    return this.displacements(asFloatArray(positions));
+    const { positions, summary } = await this.call(() => this.gateway.deform.deformOnce(request, options));
+    return { displacements: this.displacements(asFloatArray(positions)), summary: summary ?? null };
   }
 
   /** Solves in full and keeps the answer under this title. */

@@ -60,12 +60,17 @@ export class FaceColors {
     return this.show(title, false);
   }
 
-  private show(title: string, hasBand: boolean): MapLegend {
-    const { largestMm, band } = largestOf(this.values.map((values, index) => largestMovement(values, hasBand ? this.bands[index] : null)));
-    const mostMm = roundUp(largestMm);
+  /** The numbers that were shown last, where the last color stands for `mostMm`: faces side by side have one scale. */
+  rescale(mostMm: number): void {
     this.values.forEach((values, index) => colorize(values, mostMm, TABLE, this.colors[index]));
     this.head.colorSkin(this.colors);
     this.isColored = true;
+  }
+
+  private show(title: string, hasBand: boolean): MapLegend {
+    const { largestMm, band } = largestOf(this.values.map((values, index) => largestMovement(values, hasBand ? this.bands[index] : null)));
+    const mostMm = roundUp(largestMm);
+    this.rescale(mostMm);
     return { title, mostMm, largestMm, band };
   }
 }

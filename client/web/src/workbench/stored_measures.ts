@@ -6,13 +6,27 @@ import type { Measure } from "../generated/tissueform/v1/export_service_pb";
 import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import { FollowingSurface } from "../geometry/following_surface";
 import type { Pose } from "../geometry/pose";
-import { type ShownFace, collectMeasures } from "../measures/face_measures";
+import { type ShownFace, toMessages } from "../measures/face_measures";
 import type { LandmarkBook } from "../measures/landmark_book";
+import { measureAtRest } from "../measures/rest_measures";
+import type { PlanAnswers } from "../measures/whole_band";
 import type { Comparer, Shape } from "./comparison";
 
-/** The numbers of a stored prediction's face, whatever is on the stage meanwhile. `planned`: what the plan shows. Rejects with a CallError. */
-export async function storedMeasures(file: CaseFile, landmarks: LandmarkBook, comparer: Pick<Comparer, "between">, prediction: Prediction, planned: Shape): Promise<Measure[]> {
-  return collectMeasures(new FaceOfShape(file, landmarks, await comparer.between({ from: "rest", to: prediction, share: 1 }, planned)));
+/** What the page knows of a stored prediction, and who answers for it. */
+export interface StoredFace {
+  file: CaseFile;
+  landmarks: LandmarkBook;
+  comparer: Pick<Comparer, "between">;
+  /** What the plan shows, which may be something else. */
+  planned: Shape;
+  answers: PlanAnswers;
+}
+
+/** The numbers of a stored prediction's face, independent of what is on the stage. Rejects with a CallError. */
+export async function storedMeasures({ file, landmarks, comparer, planned, answers }: StoredFace, prediction: Prediction): Promise<Measure[]> {
+  const shape = await comparer.between({ from: "rest", to: prediction, share: 1 }, planned);
+  const ofShape = { handles: answers.handles, poses: () => shape.poses, skinAt: (poses: readonly Pose[]) => answers.skinAt(poses) };
+  return toMessages(await measureAtRest(new FaceOfShape(file, landmarks, shape), ofShape));
 }
 
 /** A face that nobody looks at. */

@@ -39,10 +39,10 @@ export class StoredPredictions {
     this.all.value = await this.answers.list();
   }
 
-  /** Solves in full and keeps it. */
-  async store(title: string): Promise<Prediction> {
-    const { session, model, poses } = this.uses.question();
-    const prediction = await this.answers.store(session, model, poses, title);
+  /** Solves in full and keeps it. `poses`: left out, those of the plan. */
+  async store(title: string, poses?: Pose[]): Promise<Prediction> {
+    const { session, model, poses: planned } = this.uses.question();
+    const prediction = await this.answers.store(session, model, poses ?? planned, title);
     this.all.value = [prediction, ...this.all.value];
     return prediction;
   }

@@ -17,13 +17,16 @@ import { LocalAnswers, type LocalState } from "../live/local_answers";
 import type { Anchor } from "../measures/anchor";
 import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
+import type { PlanAnswers } from "../measures/whole_band";
+import type { BoundPhotograph } from "../movingdata/photograph_data";
 import { JawOpening } from "../planning/jaw_opening";
 import { Plan } from "../planning/plan";
 import { Gizmo } from "../scene/gizmo";
 import type { HeadView } from "../scene/head_view";
+import type { Volume } from "../volume/volume";
 import { Answers } from "./answers";
 import { Comparer, type Comparison, type Shape } from "./comparison";
-import { type ShownLegend, followedRest } from "./face_colors";
+import { type ShownLegend, followedRest, subtractInto } from "./face_colors";
 import { FaceMap, type MapChoice } from "./face_map";
 import { NewestAnswer } from "./newest_answer";
 import { PacsExports } from "./pacs_exports";
@@ -48,6 +51,8 @@ export interface Picking {
   kinds: readonly SurfaceKind[];
   /** Null: nothing of these kinds was there. */
   take(anchor: Anchor | null): void;
+  /** In place of `take`, where the point is not on the case: a place of the picture, in the page's pixels. */
+  takeAt?(x: number, y: number): void;
 }
 
 const SETTLE_MS = 150;
@@ -81,15 +86,21 @@ export class Workbench implements ShownFace {
   readonly answer = new Signal<ShownAnswer | null>(null);
   readonly localState = new Signal<LocalState>({ kind: "none" });
   readonly model = new Signal<DeformationModel>(0);
+  /** A CT of this patient in the coordinates of the case, which the slices show. It stays in the page. */
+  readonly volume = new Signal<Volume | null>(null);
   readonly comparison = new Signal<Comparison | null>(null);
   readonly penetrations = new Signal<Penetration[]>([]);
   /** Teeth alone are shown, colored by this legend; null: the whole head. */
   readonly bite = new Signal<ShownLegend | null>(null);
   /** What the next click upon the picture is for; null: for nothing but looking and taking a segment. */
   readonly picking = new Signal<Picking | null>(null);
+  /** The registered photograph; null: none. */
+  readonly photograph = new Signal<BoundPhotograph | null>(null);
   /** The face or the bone on the stage changed. */
   readonly shown = new Signal(0);
 
+  /** Of CaseFile.followed. */
+  private readonly rest: Float32Array;
   private readonly comparer: Comparer;
   private readonly newest: NewestAnswer;
   private readonly penetrationTest: PenetrationTest;
@@ -109,7 +120,7 @@ export class Workbench implements ShownFace {
     this.plan = new Plan(file);
     this.landmarks = new LandmarkBook(file);
     this.jaw = new JawOpening(file);
-    const rest = followedRest(file);
+    const rest = (this.rest = followedRest(file));
     this.newest = new NewestAnswer(rest);
     this.touchReader = new TouchReader(file, rest);
     this.answers = new Answers(gateway, file, caseName, rest);
@@ -118,7 +129,7 @@ export class Workbench implements ShownFace {
       question: () => ({ session: this.live.session, model: this.model.value, poses: this.plan.poses() }),
       measuresOf: async (prediction) => {
         if (prediction.mesh !== (file.parted ?? file).manifest.mesh.name) throw new Error(NOT_TO_PACS);
-        return storedMeasures(file, this.landmarks, this.comparer, prediction, this.planned);
+        return storedMeasures({ file, landmarks: this.landmarks, comparer: this.comparer, planned: this.planned, answers: this.planAnswers }, prediction);
       },
       onRemoved: async ({ name }) => {
         if (this.comparison.value?.to.name === name) await this.compare(null);
@@ -262,6 +273,36 @@ export class Workbench implements ShownFace {
     return forcesN === null ? null : this.touchReader.read(this.newest.displacements, forcesN);
   }
 
+  /** For measures at rest. */
+  get planAnswers(): PlanAnswers {
+    return { handles: this.plan.handles, poses: () => this.plan.poses(), skinAt: (poses) => this.skinAt(poses) };
+  }
+
+  /** Where the surfaces' vertices would be under other poses, by the page's own answers; null where it has none of them. */
+  async skinAt(poses: readonly Pose[]): Promise<((surface: number) => Float32Array) | null> {
+    const displacements = await this.displacementsAt(poses);
+    if (displacements === null) return null;
+    const known = new Map<number, Float32Array>();
+    return (surface) => {
+      const { shape } = this.view.head.surfaces[surface];
+      const places = known.get(surface) ?? shape.rest.slice();
+      if (!known.has(surface)) shape.follow(displacements, places);
+      known.set(surface, places);
+      return places;
+    };
+  }
+
+  /** Skin and bone under other poses, by the page's own answers; null where it has none of them. */
+  async shapeAt(poses: Pose[]): Promise<Shape | null> {
+    const displacements = await this.displacementsAt(poses);
+    return displacements && { displacements, uncertainty: this.hasBand ? await this.local.bandAt(poses) : null, poses };
+  }
+
+  /** Where bone overlaps under other poses, more than pre-op. */
+  penetrationsAt(poses: readonly Pose[]): Penetration[] {
+    return this.penetrationTest.find(this.posesByHandle(poses));
+  }
+
   posesByHandle(poses: readonly Pose[]): Map<string, Pose> {
     return new Map(this.plan.handles.map((handle, index) => [handle.name, poses[index]]));
   }
@@ -272,6 +313,13 @@ export class Workbench implements ShownFace {
   /** Tissue slides and lips part: the case has contact rows, and they count. */
   get touches(): boolean {
     return this.file.sessionRequest.contact.length > 0;
+  }
+
+  /** Of CaseFile.followed. */
+  private async displacementsAt(poses: readonly Pose[]): Promise<Float32Array | null> {
+    const positions = await this.local.positionsAt(poses);
+    if (positions === null || positions.length !== this.rest.length) return null;
+    return subtractInto(positions, this.rest, positions);
   }
 
   private knowsBand(model: DeformationModel): boolean {
@@ -305,7 +353,7 @@ export class Workbench implements ShownFace {
 
   /** The hand rests: what takes longer than a picture is done now. */
   private settled(): void {
-    this.penetrations.value = this.penetrationTest.find(this.posesByHandle(this.plan.poses()));
+    this.penetrations.value = this.penetrationsAt(this.plan.poses());
     this.showPenetrations();
     if (this.map.choice.value.kind === "model") {
       this.map.refresh().then(

@@ -8,6 +8,7 @@ import { type ToldPlan, planDocument } from "../../src/exports/plan_export";
 import { SolveSummarySchema } from "../../src/generated/tissueform/v1/deform_service_pb";
 import type { Prediction } from "../../src/generated/tissueform/v1/prediction_pb";
 import { DeformationModel } from "../../src/generated/tissueform/v1/session_pb";
+import { measureFace } from "../../src/measures/face_measures";
 import { LandmarkBook } from "../../src/measures/landmark_book";
 import { Plan } from "../../src/planning/plan";
 import type { ShownAnswer } from "../../src/workbench/shown_answer";
@@ -37,14 +38,14 @@ async function told(changes: Partial<ToldPlan> = {}) {
     showsPlan: true,
     ...changes,
   };
-  return JSON.parse(planDocument(bench));
+  return JSON.parse(planDocument(bench, measureFace(bench)));
 }
 
 test("the plan's face goes along with its numbers and their band", async () => {
   const document = await told();
   expect(document.segments[0].move.forwardMm).toBe(FORWARD_MM);
   expect(document.landmarks).toMatchObject([{ name: "pogonion", forwardMm: FORWARD_MM }, { name: "soft_pogonion", leftMm: 1, band_95_mm: 0.25 }]);
-  expect(document.measures).toMatchObject([{ name: "chin_midline", before: 0, after: 1, lowest_after: expect.closeTo(0.75), highest_after: expect.closeTo(1.25) }]);
+  expect(document.measures).toMatchObject([{ name: "chin_midline", before: 0, after: 1, lowest_after: expect.closeTo(0.75), highest_after: expect.closeTo(1.25), interval_of: "material" }]);
   expect(document).not.toHaveProperty("left_out");
 });
 

@@ -3,7 +3,7 @@
 
 import { beforeEach, expect, test } from "vitest";
 import { type CaseFile, openCase } from "../../src/case/case_file";
-import { type ShownFace, collectMeasures, measureFace, shownPoint } from "../../src/measures/face_measures";
+import { type ShownFace, measureFace, shownPoint, toMessages } from "../../src/measures/face_measures";
 import { type Anchor, nearestAnchor, readAnchor } from "../../src/measures/anchor";
 import { faceFrame } from "../../src/measures/face_point";
 import { LandmarkBook } from "../../src/measures/landmark_book";
@@ -110,14 +110,13 @@ test("a measure of one's own goes with its landmark", () => {
   expect(book.own).toEqual([]);
 });
 
-test("measures for the PACS hold numbers only, with their band where it is known, and none of a face that is not the plan's", () => {
+test("measures for the PACS hold numbers only, with their band where it is known", () => {
   book.place("soft_pogonion", middle(SKIN));
   const bandOf = () => new Float32Array(4).fill(0.4);
-  const [measure, ...others] = collectMeasures(shown({ bandOf }));
+  const [measure, ...others] = toMessages(measureFace(shown({ bandOf })));
   expect(others).toEqual([]);
   expect(measure).toMatchObject({ name: "chin_midline", unit: "mm", before: expect.closeTo(10 / 3), lowestAfter: expect.closeTo(10 / 3 - 0.4), highestAfter: expect.closeTo(10 / 3 + 0.4) });
-  expect(collectMeasures(shown())[0].lowestAfter).toBeUndefined();
-  expect(collectMeasures(shown({ showsPlan: false }))).toEqual([]);
+  expect(toMessages(measureFace(shown()))[0].lowestAfter).toBeUndefined();
 });
 
 test("the section of a closed surface is one line, and its outline has the foremost point of each level", () => {

@@ -17,7 +17,7 @@ test.each<[string, Partial<Ready>, string]>([
 });
 
 test("the largest movement is told with its band where that is known", () => {
-  expect(largestText({ largestMm: 8.123, band: { lowestMm: 7.5, highestMm: 8.8 } })).toBe("largest 8.12 mm, 95 % interval 7.50 to 8.80");
+  expect(largestText({ largestMm: 8.123, band: { lowestMm: 7.5, highestMm: 8.8 } })).toBe("largest 8.12 mm, 95 % interval (stiffness only) 7.50 to 8.80");
   expect(largestText({ largestMm: 8.123, band: null })).toBe("largest 8.12 mm");
 });
 

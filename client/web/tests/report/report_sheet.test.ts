@@ -7,7 +7,9 @@ import { SolveSummarySchema } from "../../src/generated/tissueform/v1/deform_ser
 import { PredictionSchema } from "../../src/generated/tissueform/v1/prediction_pb";
 import { type ModelInfo, ModelInfoSchema } from "../../src/generated/tissueform/v1/server_info_pb";
 import { DeformationModel } from "../../src/generated/tissueform/v1/session_pb";
-import { answerLine } from "../../src/report/report_sheet";
+import { MEASURES } from "../../src/measures/definitions";
+import type { Band, MeasureResult } from "../../src/measures/evaluation";
+import { answerLine, intervalLine } from "../../src/report/report_sheet";
 import type { Comparison } from "../../src/workbench/comparison";
 import type { ShownAnswer } from "../../src/workbench/shown_answer";
 import { Signal } from "../../src/workbench/signal";
@@ -36,4 +38,11 @@ test("a stored face is told by its own model and answer, whatever the plan's is"
   const to = create(PredictionSchema, { model: DeformationModel.LINEAR_ELASTIC, summary: { converged: true, load: 1 } });
   expect(line(OWN, { from: "plan", to, share: 1 })).toBe("model linear_elastic. A stored prediction. Full answer.");
   expect(line(OWN, { from: "plan", to, share: 0 })).toMatch(/^model neo_hookean\. Estimate.* Computed by the page/);
+});
+
+test("the report says what its intervals hold, or why there are none", () => {
+  const result = (band: Band | null): MeasureResult => ({ definition: MEASURES[0], kind: "value", before: 0, after: 1, band });
+  expect(intervalLine([result(null), result({ lowest: 0, highest: 2, parts: { surgery: 1, model: 0.5, material: null } })], "")).toBe("95 % interval: surgery and model together, with published deviations of surgery and model");
+  expect(intervalLine([result({ lowest: 0, highest: 2 })], "")).toBe("95 % interval, material uncertainty only; excludes model and surgical error");
+  expect(intervalLine([result(null)], "the model is not elastic")).toBe("no 95 % interval: the model is not elastic");
 });

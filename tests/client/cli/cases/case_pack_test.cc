@@ -213,9 +213,9 @@ TEST_F(CasePackTest, ATitleIsTextAndTheFoldersNameIsNone) {
 }
 
 TEST_F(CasePackTest, AFullDiskLeavesNothing) {
-  const ProcessResult result =
-      RunTissueform({"case", "pack", TestDataPath("plans/bar/plan.json"), "--out", "packed.tfcase"},
-                    folder_, 1000);
+  const ProcessResult result = RunCommandLine(
+      {"case", "pack", TestDataPath("plans/bar/plan.json"), "--out", "packed.tfcase"}, folder_,
+      1000);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(Files(), Not(::testing::Contains("packed.tfcase")));
 }

@@ -427,6 +427,74 @@ TEST_F(DeformTest, ContactIsReportedAndCanBeTurnedOff) {
   EXPECT_NE(Read("off.vtu"), Read("on.vtu"));
 }
 
+TEST_F(DeformTest, WithContactOffTheResultsArrayTellsOfNone) {
+  const std::string plan = TestDataPath("plans/head_lips/plan.json");
+  const auto contact_of = [&](const std::string& use) {
+    EXPECT_THAT(Run({"deform", plan, "--out", "a.vtu", "--contact", use}), Succeeds());
+    const absl::StatusOr<TetMeshFile> result = ReadTetMesh(Path("a.vtu"));
+    return ToDoubles(*FindAttribute(result->point_data, "contact"));
+  };
+  const std::vector<double> on = contact_of("on");
+  EXPECT_GT(std::ranges::count(on, 1.0), 100);
+  const std::vector<double> off = contact_of("off");
+  EXPECT_EQ(std::ranges::count(off, 0.0), static_cast<ptrdiff_t>(off.size()));
+}
+
+TEST_F(DeformTest, TheWholeBandNamesItsPartsAndTakesAClinicsFigures) {
+  const std::string plan = TestDataPath("plans/head_chin/plan.json");
+  const auto place_of = [&](const std::vector<std::string>& more, const std::string& name) {
+    std::vector<std::string> args = {"deform",         plan,      "--out", "a.vtu", "--model",
+                                     "linear_elastic", "--stats", "a.json"};
+    args.insert(args.end(), more.begin(), more.end());
+    const ProcessResult result = Run(args);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("; of this surgery "));
+    const auto places = nlohmann::json::parse(Read("a.json"))["uncertainty"]["places"];
+    const auto found =
+        std::ranges::find_if(places, [&](const auto& place) { return place["name"] == name; });
+    EXPECT_NE(found, places.end());
+    return *found;
+  };
+  const nlohmann::json published = place_of({}, "chin");
+  EXPECT_LT(published["low_mm"], published["movement_mm"]);
+  EXPECT_GT(published["high_mm"], published["movement_mm"]);
+  EXPECT_GT(published["surgery_mm"], 0.1);
+  // The nose does not move: its interval is along the normal, 1.96 standard deviations.
+  EXPECT_NEAR(place_of({}, "nose")["model_mm"], 1.96 * 0.89, 0.05);
+  Write("exact.json", R"({"surgery": {"translation_mm": [0, 0, 0], "rotation_deg": [0, 0, 0]},
+                          "model_mm": {"default": 0, "lower_lip": 0, "upper_lip": 0}})");
+  EXPECT_EQ(SchemaFindings("deviations.schema.json", "exact.json", {"", "surgery", "model_mm"}),
+            "");
+  const nlohmann::json exact = place_of({"--deviations", "exact.json"}, "chin");
+  EXPECT_EQ(exact["surgery_mm"], 0);
+  EXPECT_EQ(exact["model_mm"], 0);
+  EXPECT_LT(exact["high_mm"].get<double>() - exact["low_mm"].get<double>(), 0.5);
+  ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("a.vtu")));
+  EXPECT_NE(FindAttribute(result.point_data, "total_uncertainty_p95_mm"), nullptr);
+}
+
+TEST_F(DeformTest, DeviationsThatAreNoneAreRefusedInOneLine) {
+  const std::string plan = TestDataPath("plans/head_chin/plan.json");
+  const std::vector<std::pair<std::string, std::string>> wrong = {
+      {"[]", "is not a JSON object"},
+      {R"({"surgery": {"translation": [1, 1, 1]}})", "unknown key \"translation\""},
+      {R"({"surgery": {"translation_mm": [1, 1]}})", "needs three numbers"},
+      {R"({"model_mm": {"chin": -1}})", "\"chin\" needs numbers from 0 to 100"},
+      {R"({"model_mm": {"chn": 1}})", "unknown place \"chn\" in \"model_mm\"; allowed: default,"},
+      {R"({"model": 3})", "key \"model\" is not known"},
+      {R"({"source": )", "deviations wrong.json"}};
+  for (const auto& [text, message] : wrong) {
+    Write("wrong.json", text);
+    const ProcessResult result =
+        Run({"deform", plan, "--out", "a.vtu", "--deviations", "wrong.json"});
+    EXPECT_NE(result.exit_code, 0);
+    EXPECT_THAT(result.err, HasSubstr(message));
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+    EXPECT_NE(SchemaFindings("deviations.schema.json", "wrong.json", {"", "surgery", "model_mm"}),
+              "");
+  }
+}
+
 TEST_F(DeformTest, LipsAreSealedWhenAskedAndTheResultSaysSo) {
   const PartedBlock block;
   ASSERT_THAT(

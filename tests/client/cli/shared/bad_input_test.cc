@@ -201,8 +201,8 @@ TEST_F(BadInputTest, PlaceThatCannotBeWritten) {
 TEST_F(BadInputTest, FullDiskLeavesTheOldFileAndNothingElse) {
   Write("out.vtu", "old");
   const ProcessResult result =
-      RunTissueform({"deform", TestDataPath("plans/bar/plan.json"), "--out", "out.vtu"}, folder_,
-                    /*max_file_bytes=*/4096);
+      RunCommandLine({"deform", TestDataPath("plans/bar/plan.json"), "--out", "out.vtu"}, folder_,
+                     /*max_file_bytes=*/4096);
   EXPECT_THAT(result, IsRefused("out.vtu"));
   EXPECT_EQ(Read("out.vtu"), "old");
   EXPECT_THAT(Files(), ElementsAre("bar.vtu", "out.vtu"));

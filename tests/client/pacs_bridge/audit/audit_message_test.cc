@@ -49,9 +49,10 @@ TEST(AuditMessage, ATransferNamesBothSidesTheStudyAndThePatient) {
 }
 
 TEST(AuditMessage, EveryKindFollowsTheSchema) {
-  for (const auto kind : {AuditEvent::Kind::kApplicationStart, AuditEvent::Kind::kApplicationStop,
-                          AuditEvent::Kind::kQuery, AuditEvent::Kind::kTransferBegin,
-                          AuditEvent::Kind::kTransferred, AuditEvent::Kind::kNodeRefused}) {
+  for (const auto kind :
+       {AuditEvent::Kind::kApplicationStart, AuditEvent::Kind::kApplicationStop,
+        AuditEvent::Kind::kQuery, AuditEvent::Kind::kTransferBegin, AuditEvent::Kind::kTransferred,
+        AuditEvent::Kind::kLogin, AuditEvent::Kind::kNodeRefused}) {
     for (const absl::Status& outcome : {absl::OkStatus(), absl::UnavailableError("is <away>")}) {
       AuditEvent event = TransferEvent();
       event.kind = kind;

@@ -34,10 +34,12 @@ class CountingSink final : public InstanceSink {
     return answer;
   }
   void AssociationEnded(const EndedAssociation& /*ended*/) override { ++ended_count; }
+  void ConnectionRefused(const RefusedConnection& /*refused*/) override { ++refused_count; }
 
   absl::Status answer;
   int kept = 0;
   int ended_count = 0;
+  int refused_count = 0;
 };
 
 class AuditedSinkTest : public ::testing::Test {
@@ -46,7 +48,8 @@ class AuditedSinkTest : public ::testing::Test {
     auto audit = BridgeAudit::Start(std::make_unique<AuditRecorder>(&record_), "TISSUEFORM");
     EXPECT_THAT(audit, IsOk());
     audit_ = *std::move(audit);
-    sink_.emplace(audit_.get(), &counting_);
+    access_.emplace(audit_.get(), AccessAudit::Options{});
+    sink_.emplace(audit_.get(), &*access_, &counting_);
   }
 
   absl::Status Keep(int64_t association, const std::string& study, const std::string& patient) {
@@ -79,6 +82,7 @@ class AuditedSinkTest : public ::testing::Test {
   AuditRecord record_;
   CountingSink counting_;
   std::unique_ptr<BridgeAudit> audit_;
+  std::optional<AccessAudit> access_;
   std::optional<AuditedSink> sink_;
 };
 
@@ -134,6 +138,13 @@ TEST_F(AuditedSinkTest, TheEndOfTheProcessIsTold) {
   ASSERT_EQ(record_.messages().size(), 2);
   EXPECT_EQ(ValuesOf(record_.messages()[1], "//EventTypeCode/@csd-code"), "110121");
   EXPECT_EQ(SchemaErrors(record_.messages()[1]), "");
+}
+
+TEST_F(AuditedSinkTest, ARefusedConnectionIsAnAlertAndPassedOn) {
+  sink_->ConnectionRefused(
+      {.address = "192.0.2.9", .calling_ae = "X", .reason = "unknown address"});
+  EXPECT_THAT(Events(), ::testing::ElementsAre("110100 0  ", "110113 8  "));
+  EXPECT_EQ(counting_.refused_count, 1);
 }
 
 }  // namespace

@@ -121,6 +121,19 @@ std::vector<EndedAssociation> RecordingSink::WaitForEnds(size_t count) const {
   return ends_;
 }
 
+void RecordingSink::ConnectionRefused(const RefusedConnection& refused) {
+  MutexLock lock(mutex_);
+  refusals_.push_back(absl::StrCat(refused.address, " ", refused.calling_ae, ": ", refused.reason));
+  changed_.NotifyAll();
+}
+
+std::vector<std::string> RecordingSink::WaitForRefusals(size_t count) const {
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  MutexLock lock(mutex_);
+  while (refusals_.size() < count && changed_.WaitUntil(mutex_, until)) continue;
+  return refusals_;
+}
+
 std::string DataSetOfFile(const fs::path& path) {
   const std::string bytes = BytesOfFile(path);
   if (bytes.size() < 144) return {};

@@ -40,11 +40,14 @@ class RecordingSink : public InstanceSink {
  public:
   absl::Status Keep(const ReceivedInstance& instance) override;
   void AssociationEnded(const EndedAssociation& ended) override;
+  void ConnectionRefused(const RefusedConnection& refused) override;
 
   void Answer(absl::Status answer);
   std::vector<ReceivedInstance> instances() const;
   // Waits until so many associations have ended, up to 20 s.
   std::vector<EndedAssociation> WaitForEnds(size_t count) const;
+  // "address title: reason" of each refused connection, once there are so many, up to 20 s.
+  std::vector<std::string> WaitForRefusals(size_t count) const;
 
  private:
   mutable Mutex mutex_;
@@ -52,6 +55,7 @@ class RecordingSink : public InstanceSink {
   absl::Status answer_ ABSL_GUARDED_BY(mutex_);
   std::vector<ReceivedInstance> instances_ ABSL_GUARDED_BY(mutex_);
   std::vector<EndedAssociation> ends_ ABSL_GUARDED_BY(mutex_);
+  std::vector<std::string> refusals_ ABSL_GUARDED_BY(mutex_);
 };
 
 // The bytes of a PS3.10 file after its meta header.

@@ -36,6 +36,7 @@ namespace tissueform::testing {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -148,6 +149,9 @@ TEST_F(StorageReceiverTest, WrongAndUnknownTitlesAndAddressesAreRefused) {
   EXPECT_NE(Send(series.files).exit_code, 0);
   EXPECT_THAT(Received(), IsEmpty());
   EXPECT_EQ(receiver_->Counts().refused, 1);
+  EXPECT_THAT(sink_.WaitForRefusals(3), ElementsAre("127.0.0.1 STRANGER: unknown calling AE title",
+                                                    "127.0.0.1 SCANNER: wrong called AE title",
+                                                    "127.0.0.1 : unknown address"));
 }
 
 TEST_F(StorageReceiverTest, AtTheWatermarkTheSenderIsToldThatThereIsNoRoom) {
@@ -289,6 +293,7 @@ TEST_F(StorageReceiverTest, SilenceEndsAConnection) {
 TEST_F(StorageReceiverTest, RandomBytesEndTheirConnectionAlone) {
   options_.connect_time = std::chrono::seconds(1);
   Start();
+  const std::string broken = "127.0.0.1 : no valid association request, or TLS failed";
   for (const std::string& bytes :
        {std::string("GET / HTTP/1.1\r\n\r\n"), std::string("\x01\x00\xFF\xFF\xFF\xFF", 6),
         std::string("\x01\x00\x00\x00\x00\x04gurk", 10), std::string(5000, '\x02')}) {
@@ -296,6 +301,9 @@ TEST_F(StorageReceiverTest, RandomBytesEndTheirConnectionAlone) {
     one.Say(bytes);
     one.ReadAll();
   }
+  // DCMTK takes the last one for a request.
+  EXPECT_THAT(sink_.WaitForRefusals(4),
+              ElementsAre(broken, broken, broken, "127.0.0.1 : unknown application context"));
   EXPECT_EQ(Send(WriteCtSeries(sent_, {.slices = 1}).files).exit_code, 0);
 }
 
@@ -326,6 +334,8 @@ TEST_F(StorageReceiverTest, BeyondTheLimitAnAssociationIsRefusedForNow) {
   EXPECT_NE(end.exit_code, 0);
   EXPECT_THAT(end.said, HasSubstr("Local Limit Exceeded"));
   EXPECT_THAT(end.said, HasSubstr("Rejected Transient"));
+  EXPECT_THAT(sink_.WaitForRefusals(1),
+              ElementsAre("127.0.0.1 SCANNER: too many associations are open"));
 }
 
 TEST_F(StorageReceiverTest, StoppingBreaksOffWhatIsOpen) {

@@ -28,9 +28,9 @@ class HeadObjectsTest : public ObjectsFixture {
   // In place of the sample: the head, all of which goes as the sample does.
   PredictionObjectsInput MakeHeadInput() {
     PredictionObjectsInput input = MakeInput();
-    EXPECT_EQ(RunTissueform({"case", "pack", TestDataPath("plans/three_segments/plan.json"),
-                             "--out", "head.tfcase"},
-                            folder_)
+    EXPECT_EQ(RunCommandLine({"case", "pack", TestDataPath("plans/three_segments/plan.json"),
+                              "--out", "head.tfcase"},
+                             folder_)
                   .exit_code,
               0);
     const auto contents = ReadCase(folder_ / "head.tfcase");
@@ -58,7 +58,7 @@ class HeadObjectsTest : public ObjectsFixture {
                static_cast<std::streamsize>(static_cast<size_t>(positions.size()) * sizeof(float)));
     // Under AddressSanitizer: Mesa's leaks, see tests/core/planning/rendering/figure_test.cc.
     const ScopedEnvironment no_leak_check("LSAN_OPTIONS", "detect_leaks=0");
-    const ProcessResult rendered = RunTissueform(
+    const ProcessResult rendered = RunCommandLine(
         {"case", "render", "head.tfcase", "--positions", "after.f32", "--out", "pictures"},
         folder_);
     EXPECT_EQ(rendered.exit_code, 0) << rendered.err;
@@ -81,7 +81,7 @@ TEST_F(HeadObjectsTest, IsWrittenWithoutAnError) {
        {"stl:segment:maxilla", "stl:segment:mandible", "stl:segment:chin", "stl:bone"}) {
     EXPECT_EQ(objects.count(key), 1U) << key;
   }
-  if (!Has("dciodvfy")) GTEST_SKIP() << "dicom3tools is not installed";
+  ASSERT_TRUE(Has("dciodvfy")) << "dicom3tools is not installed";
   for (const auto& [key, object] : objects) {
     Run("dciodvfy " + object.path);
     EXPECT_THAT(Said(), Not(HasSubstr("Error"))) << key;

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
@@ -24,6 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -177,6 +180,37 @@ TEST_F(ReviewTest, ItsPasswordIsAskedForEverything) {
     EXPECT_THAT(Curl("-u 'x:wrong horse battery staple'", path), StartsWith("HTTP/1.1 401"));
     EXPECT_THAT(Curl("-u 'x:correct horse battery staple'", path), StartsWith("HTTP/1.1 200"));
   }
+}
+
+TEST_F(ReviewTest, EveryRequestWithAPasswordIsReportedAndServedWhenThatIsTaken) {
+  const std::string file = (root_ / "password").string();
+  std::ofstream(file) << "correct horse battery staple\n";
+  fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
+  std::mutex mutex;
+  std::vector<std::string> logins;
+  Start({.token_file = file, .on_login = [&](const ReviewLogin& login) {
+           const std::lock_guard<std::mutex> lock(mutex);
+           logins.push_back(absl::StrCat(login.address, " ", login.user, " ", login.is_accepted));
+           return absl::OkStatus();
+         }});
+  Curl("");
+  Curl("-H 'Authorization: Bearer x'");
+  Curl("-u 'eve:wrong horse battery staple'");
+  EXPECT_THAT(Curl("-u 'ada:correct horse battery staple'"), StartsWith("HTTP/1.1 200"));
+  const std::lock_guard<std::mutex> lock(mutex);
+  EXPECT_THAT(logins, ElementsAre("127.0.0.1  0", "127.0.0.1 eve 0", "127.0.0.1 ada 1"));
+}
+
+TEST_F(ReviewTest, ALoginThatCannotBeRecordedIsNotServed) {
+  const std::string file = (root_ / "password").string();
+  std::ofstream(file) << "correct horse battery staple\n";
+  fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
+  Start({.token_file = file,
+         .on_login = [](const ReviewLogin&) { return absl::UnavailableError("full"); }});
+  const std::string page = Curl("-u 'ada:correct horse battery staple'");
+  EXPECT_THAT(page, StartsWith("HTTP/1.1 503"));
+  EXPECT_THAT(page, Not(HasSubstr("Planted")));
+  EXPECT_THAT(Curl("-u 'ada:wrong horse battery staple'"), StartsWith("HTTP/1.1 401"));
 }
 
 TEST_F(ReviewTest, WithoutAPasswordItListensOnLoopbackOnly) {

@@ -62,6 +62,27 @@ class FolderCaseServer : public CaseServer {
   absl::StatusOr<std::vector<double>> ReadBand(const CaseFile&, const v1::Prediction&) override {
     return band;
   }
+  absl::StatusOr<std::string> SendDraft(const std::string& ct, const std::string& title,
+                                        const std::string& recipe_json) override {
+    TF_RETURN_IF_ERROR(away);
+    v1::BuildDraft draft;
+    draft.set_name(absl::StrCat("buildDrafts/", ++num_drafts));
+    draft.set_title(title);
+    draft.set_recipe_json(recipe_json);
+    draft.set_total_bytes(static_cast<int64_t>(ct.size()));
+    std::ofstream(folder_ / "ct.mha") << ct;
+    drafts.push_back(draft);
+    return draft.name();
+  }
+  absl::StatusOr<std::vector<v1::BuildDraft>> ListDrafts() override {
+    TF_RETURN_IF_ERROR(away);
+    return drafts;
+  }
+  absl::Status RemoveDraft(const std::string& name) override {
+    TF_RETURN_IF_ERROR(away);
+    const auto is_it = [&name](const v1::BuildDraft& draft) { return draft.name() == name; };
+    return std::erase_if(drafts, is_it) > 0 ? absl::OkStatus() : absl::NotFoundError("no draft");
+  }
   absl::StatusOr<v1::Export> GetExport(const std::string& name) override {
     TF_RETURN_IF_ERROR(away);
     if (taken_back.contains(name)) return absl::NotFoundError("no such export");
@@ -86,6 +107,8 @@ class FolderCaseServer : public CaseServer {
   }
 
   absl::Status away = {};
+  std::vector<v1::BuildDraft> drafts = {};
+  int num_drafts = 0;
   bool predictions_gone = false;
   std::set<std::string> taken_back = {};      // exports
   std::string mesh = SampleCase().mesh.name;  // of its predictions

@@ -9,6 +9,7 @@
 #include "core/base/status_macros.h"
 #include "core/imaging/anatomy/bone_parts.h"
 #include "core/imaging/anatomy/mouth_line.h"
+#include "core/imaging/anatomy/skin_regions.h"
 #include "core/imaging/ct/ct_volume_reader.h"
 #include "core/imaging/ct/isotropic_resample.h"
 #include "tests/core/imaging/anatomy/head_phantom.h"
@@ -49,6 +50,19 @@ absl::StatusOr<Mouth> MouthOf(const HuGrid& ct, const LabelGrid& metal = {}) {
   return mouth;
 }
 
+// Where the regions of the lips meet in the midline, by steps of 0.1 mm.
+Eigen::Vector3d BorderOfLips(const Mouth& mouth) {
+  const FaceAxes axes(mouth.landmarks);
+  FaceCoordinates at = axes.Of(mouth.landmarks.upper_lip);
+  const auto region = [&] {
+    return NameSkinRegions(axes.Place(at).transpose(), mouth.landmarks, &mouth.line).front();
+  };
+  EXPECT_EQ(region(), SkinRegion::kUpperLip);
+  for (int step = 0; step < 400 && region() == SkinRegion::kUpperLip; ++step) at.up -= 0.1;
+  EXPECT_EQ(region(), SkinRegion::kLowerLip);
+  return axes.Place(at);
+}
+
 // Of the slit of air between the phantom's lips: from z = -47 to -41, out to x = 22 mm.
 void ExpectLineInTheSlit(const Mouth& mouth) {
   EXPECT_TRUE(mouth.line.line_is_sure());
@@ -81,6 +95,7 @@ TEST(MouthLineHeadsTest, WithoutTeethTheSearchBeginsMidwayBetweenTheJaws) {
       mouth.line.start_up,
       (axes.Of(mouth.landmarks.upper_incisor).up + axes.Of(mouth.landmarks.lower_incisor).up) / 2);
   ExpectLineInTheSlit(mouth);
+  EXPECT_NEAR(BorderOfLips(mouth).z(), -44, 1);
   EXPECT_THAT(DescribeMouthLine(mouth.line)[0], HasSubstr("upper front teeth are missing"));
 }
 
@@ -132,6 +147,7 @@ TEST(MouthLineHeadsTest, OnALivingHeadTheLineIsWhereTheEyeSeesIt) {
     EXPECT_LT((mouth.right_corner() - Eigen::Vector3d(-121.5, 47.5, -97.5)).norm(), 5);
     EXPECT_EQ(mouth.line.left_corner, MouthCornerReason::kNoNotch);
     EXPECT_LT((mouth.left_corner() - Eigen::Vector3d(-71.5, 45.9, -96)).norm(), 5);
+    EXPECT_NEAR(BorderOfLips(mouth).z(), -100.3, 2);
   }
 }
 

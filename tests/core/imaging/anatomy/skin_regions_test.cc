@@ -3,6 +3,8 @@
 
 #include "core/imaging/anatomy/skin_regions.h"
 
+#include <algorithm>
+
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include <Eigen/Geometry>
@@ -10,6 +12,7 @@
 namespace tissueform {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 
 // A face looking along -y, upright, its midline in x = 0.
@@ -28,12 +31,16 @@ Landmarks UprightFace() {
   return l;
 }
 
-std::vector<SkinRegion> RegionsOf(const std::vector<Eigen::Vector3d>& places, const Landmarks& l) {
+Positions Rows(const std::vector<Eigen::Vector3d>& places) {
   Positions positions(static_cast<Eigen::Index>(places.size()), 3);
   for (size_t i = 0; i < places.size(); ++i) {
     positions.row(static_cast<Eigen::Index>(i)) = places[i].transpose();
   }
-  return NameSkinRegions(positions, l);
+  return positions;
+}
+
+std::vector<SkinRegion> RegionsOf(const std::vector<Eigen::Vector3d>& places, const Landmarks& l) {
+  return NameSkinRegions(Rows(places), l);
 }
 
 TEST(SkinRegionsTest, LandmarksLieInTheRegionsThatHaveTheirNames) {
@@ -41,6 +48,31 @@ TEST(SkinRegionsTest, LandmarksLieInTheRegionsThatHaveTheirNames) {
   EXPECT_THAT(RegionsOf({l.nose_tip, l.upper_lip, l.lower_lip, l.skin_pogonion}, l),
               ElementsAre(SkinRegion::kNose, SkinRegion::kUpperLip, SkinRegion::kLowerLip,
                           SkinRegion::kChin));
+}
+
+// Midway between the lips is z = -1; the line lies higher, and higher still on the left.
+TEST(SkinRegionsTest, LipsMeetAtTheMouthLine) {
+  const Landmarks l = UprightFace();
+  const FaceAxes axes(l);
+  MouthLine mouth;
+  for (const double x : {-20, 0, 20}) {
+    mouth.points.push_back({.at = axes.Of({x, -16, 4 + 0.1 * x})});
+  }
+  mouth.seen_share = 0.6;
+  std::vector<Eigen::Vector3d> over;
+  std::vector<Eigen::Vector3d> under;
+  for (const double x : {-26, -20, -7, 0, 13, 20, 26}) {
+    const double z = 4 + 0.1 * std::clamp(x, -20.0, 20.0);
+    over.emplace_back(x, -14, z + 0.1);
+    under.emplace_back(x, -14, z - 0.1);
+  }
+  EXPECT_THAT(NameSkinRegions(Rows(over), l, &mouth), Each(SkinRegion::kUpperLip));
+  EXPECT_THAT(NameSkinRegions(Rows(under), l, &mouth), Each(SkinRegion::kLowerLip));
+  EXPECT_THAT(NameSkinRegions(Rows(under), l), Each(SkinRegion::kUpperLip)) << "midway is lower";
+  mouth.seen_share = 0.4;
+  EXPECT_THAT(NameSkinRegions(Rows(under), l, &mouth), Each(SkinRegion::kUpperLip));
+  mouth.given = true;
+  EXPECT_THAT(NameSkinRegions(Rows(under), l, &mouth), Each(SkinRegion::kLowerLip));
 }
 
 TEST(SkinRegionsTest, LeftIsThePatientsLeft) {

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <random>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -93,6 +95,68 @@ TEST(IsotropicResampleTest, LinearFunctionOfPositionIsReproduced) {
         }
       }
       EXPECT_GT(inside, 100);
+    }
+  }
+}
+
+// The mean of n samples along each axis of a voxel of the grid, each linear between centres, as the
+// header says; air where none lies in the volume.
+double MeanOfSamples(const CtVolume& volume, const Eigen::Vector3d& centre, double spacing_mm) {
+  const Eigen::Matrix3d to_index = volume.StepsMm().inverse();
+  std::vector<double> values;
+  const Eigen::Vector3d steps = (to_index.cwiseAbs().transpose() * Eigen::Vector3d::Ones());
+  const Eigen::Vector3d n = (steps * spacing_mm).array().ceil().max(1).min(8);
+  for (int sample = 0; sample < static_cast<int>(n.prod()); ++sample) {
+    const int across = static_cast<int>(n[0]);
+    const int down = static_cast<int>(n[1]);
+    const int along = sample / across / down;
+    const int of_row = sample / across % down;
+    const Eigen::Vector3d number(sample % across, of_row, along);
+    const Eigen::Vector3d offset = (number.array() + 0.5) / n.array() - 0.5;
+    const Eigen::Vector3d at = to_index * (centre + spacing_mm * offset - volume.origin_mm);
+    double sum = 0;
+    bool is_inside = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      is_inside &= at[axis] >= -0.5 && at[axis] <= volume.size[static_cast<size_t>(axis)] - 0.5;
+    }
+    if (!is_inside) continue;
+    for (int k = 0; k < volume.size[2]; ++k) {
+      for (int j = 0; j < volume.size[1]; ++j) {
+        for (int i = 0; i < volume.size[0]; ++i) {
+          double weight = 1;
+          for (int axis = 0; axis < 3; ++axis) {
+            const double end = volume.size[static_cast<size_t>(axis)] - 1;
+            const double off = std::clamp(at[axis], 0.0, end) - Eigen::Vector3d(i, j, k)[axis];
+            weight *= std::max(0.0, 1 - std::abs(off));
+          }
+          sum += weight * volume.At(i, j, k);
+        }
+      }
+    }
+    values.push_back(sum);
+  }
+  if (values.empty()) return -1024;
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+TEST(IsotropicResampleTest, UprightVolumesAreMeansOfTrilinearSamples) {
+  std::mt19937 random(7);
+  std::uniform_int_distribution<int> hu(-1024, 3000);
+  const std::vector<Eigen::Matrix3d> directions = Directions();
+  for (size_t d = 0; d < 3; ++d) {
+    const CtVolume volume = Filled({5, 7, 4}, {0.9, 1.3, 2}, directions[d],
+                                   [&](const Eigen::Vector3d&) { return hu(random); });
+    for (const double spacing_mm : {0.7, 1.1, 2.9, 9.5}) {
+      ASSERT_OK_AND_ASSIGN(const HuGrid grid, ResampleIsotropic(volume, spacing_mm));
+      for (int z = 0; z < grid.geometry.size[2]; ++z) {
+        for (int y = 0; y < grid.geometry.size[1]; ++y) {
+          for (int x = 0; x < grid.geometry.size[0]; ++x) {
+            const double mean = MeanOfSamples(volume, grid.geometry.Centre(x, y, z), spacing_mm);
+            ASSERT_NEAR(grid.At(x, y, z), mean, 0.5 + 1e-9)
+                << "direction " << d << ", " << spacing_mm << " mm";
+          }
+        }
+      }
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <gdcmImageReader.h>
 #include <gdcmWriter.h>
 #include <random>
+#include <string>
 
 #include "tests/core/imaging/ct/ct_folder.h"
 #include "tests/testing/status_matchers.h"
@@ -27,6 +28,7 @@ using tissueform::testing::WorstPhantomError;
 
 using ::tissueform::testing::kInvalid;
 
+constexpr uint32_t kSliceThickness = 0x00180050;
 constexpr uint32_t kSpacingBetweenSlices = 0x00180088;
 
 class MultiFrameTest : public CtFolder {};
@@ -107,6 +109,34 @@ TEST_F(MultiFrameTest, FramesOfThePlainClassAreEvenlySpaced) {
   ASSERT_TRUE(writer.Write());
   ASSERT_OK_AND_ASSIGN(const CtVolume compressed, Read());
   expect_phantom(compressed);
+}
+
+// SliceThickness counts only where SpacingBetweenSlices is missing: overlapping or spaced slices
+// have another.
+TEST_F(MultiFrameTest, FramesOfThePlainClassAreSpacedByTheirThicknessWithoutASpacing) {
+  DicomFile file = PlainPhantom();
+  file.Text(kSliceThickness, "DS", "3");
+  Write("ct", file.Bytes());
+  ASSERT_OK_AND_ASSIGN(const CtVolume spaced, Read());
+  EXPECT_NEAR(spaced.spacing_mm.z(), 1.25, 1e-9);
+  for (const char* const thickness : {"1.25", "0.4"}) {
+    SCOPED_TRACE(thickness);
+    file = PlainPhantom();
+    Write("ct", file.Erase(kSpacingBetweenSlices).Text(kSliceThickness, "DS", thickness).Bytes());
+    ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+    EXPECT_THAT(volume.size, ElementsAre(12, 10, 9));
+    EXPECT_NEAR(volume.spacing_mm.z(), std::stod(thickness), 1e-9);
+    EXPECT_THAT(volume.provenance.notes,
+                ::testing::Contains(HasSubstr("by SliceThickness where that is missing")));
+    if (std::stod(thickness) == 1.25) {
+      EXPECT_EQ(WorstPhantomError(volume), 0);
+    }
+  }
+  for (const char* const thickness : {"", "0", "nan", "1e9"}) {
+    file = PlainPhantom();
+    Write("ct", file.Erase(kSpacingBetweenSlices).Text(kSliceThickness, "DS", thickness).Bytes());
+    EXPECT_EQ(Read().status().code(), kInvalid) << thickness;
+  }
 }
 
 TEST_F(MultiFrameTest, FramesOfThePlainClassNeedTheirSpacing) {

@@ -369,8 +369,11 @@ TEST_F(VolumeFileTest, AxesThatContradictTheFileAreRefused) {
 
 TEST_F(VolumeFileTest, RawValuesNeedTheirOffset) {
   const std::string file = NrrdLps() + PhantomBytes<int16_t>(UprightPlace, 1024);
-  EXPECT_THAT(ReadContents("v.nrrd", file), StatusIs(kInvalid, HasSubstr("not HU")));
   CtReadOptions options;
+  ASSERT_OK_AND_ASSIGN(const CtVolume gray, ReadContents("v.nrrd", file));
+  EXPECT_TRUE(gray.has_gray_values);
+  options.values = CtValues::kHu;
+  EXPECT_THAT(Read(options, "v.nrrd"), StatusIs(kInvalid, HasSubstr("not HU")));
   options.hu_offset = -1024;
   ExpectUprightPhantom(Read(options, "v.nrrd"), "NRRD");
   options.hu_offset = 1e9;

@@ -8,7 +8,10 @@
 #include <fstream>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -19,7 +22,7 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
-// Files that pydicom, nibabel, VTK and Teem's unu have written, in the helper program.
+// Files that pydicom, DCMTK, nibabel, VTK and Teem's unu have written, in the helper program.
 namespace tissueform::testing {
 namespace {
 
@@ -176,13 +179,85 @@ TEST_F(LabelReaderTest, ReadsSegNrrdWithOneLayer) {
 }
 
 TEST_F(LabelReaderTest, ReadsDicomSegOfEachKind) {
-  for (const char* const name : {"binary.dcm", "fractional.dcm", "labelmap.dcm"}) {
+  for (const std::string name : {"binary.dcm", "binary_deflated.dcm", "binary_dcmtk.dcm",
+                                 "fractional.dcm", "fractional_deflated.dcm", "fractional_rle.dcm",
+                                 "labelmap.dcm", "labelmap_deflated.dcm", "labelmap_rle.dcm"}) {
     SCOPED_TRACE(name);
     ASSERT_OK_AND_ASSIGN(const LabelMap map, Read(name));
     EXPECT_EQ(map.format, "DICOM SEG");
     EXPECT_EQ(map.frame_uid, "1.2.826.0.1.3680043.8.498.1");
-    ExpectPhantom(map, name != std::string("labelmap.dcm"), true);
+    ExpectPhantom(map, !absl::StartsWith(name, "labelmap"), true);
   }
+}
+
+// A few bytes that unpack to more than is read, and a packed part that ends early.
+TEST_F(LabelReaderTest, RefusesDeflatedSegThatIsTooLargeOrCutOff) {
+  LabelReadOptions options;
+  options.limits.max_file_bytes = 2000;  // the file has 1 KB
+  EXPECT_THAT(Read("labelmap_deflated.dcm", options),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("more than 2000 bytes")));
+  for (const int share : {9, 5, 2}) {
+    fs::copy_file(folder / "binary_deflated.dcm", folder / "cut.dcm",
+                  fs::copy_options::overwrite_existing);
+    fs::resize_file(folder / "cut.dcm", fs::file_size(folder / "cut.dcm") * share / 10);
+    EXPECT_THAT(Read("cut.dcm"), StatusIs(kInvalid, ContainsRegex("cut off|truncated"))) << share;
+  }
+}
+
+TEST_F(LabelReaderTest, ReadsAFolderOfMasksThatOverlap) {
+  ASSERT_OK_AND_ASSIGN(const LabelMap map, Read("masks"));
+  EXPECT_EQ(map.format, "NIfTI, a file a structure");
+  ExpectPhantom(map, true, true);
+  ASSERT_EQ(map.segments.size(), 3U);
+  EXPECT_EQ(map.segments[0].name, "inferior_alveolar_canal");
+  EXPECT_EQ(map.segments[0].structure, Structure::kCanal);
+  EXPECT_EQ(map.segments[0].voxels, 3 * 4 * 3);
+  EXPECT_THAT(map.notes,
+              ElementsAre(HasSubstr("not known and not read: 1 (aorta), 6 (vertebrae_T1)."),
+                          HasSubstr("without a voxel: 4 (sinus_frontal).")));
+  ASSERT_OK_AND_ASSIGN(const LabelMap other, Read("masks_255"));
+  ExpectPhantom(other, true, true);
+  EXPECT_NE(map.sha256, other.sha256);
+}
+
+TEST_F(LabelReaderTest, NamesOfTheRecipeAreThoseOfMasks) {
+  LabelReadOptions options;
+  options.names = {{Structure::kSkull, "smith_1", {}}};
+  ASSERT_OK_AND_ASSIGN(const LabelMap map, Read("renamed", options));
+  ExpectPhantom(map, true, true);
+  options.names = {{Structure::kSinus, "sinus_frontal", {}}};  // an empty mask is no slip
+  EXPECT_THAT(Read("masks", options).status(), IsOk());
+  options.names = {{Structure::kSinus, "sinus", {}}};
+  EXPECT_THAT(Read("masks", options), StatusIs(kInvalid, HasSubstr("has no such segment")));
+  options.names = {{Structure::kSkull, "", 3}};
+  EXPECT_THAT(Read("masks", options), StatusIs(kInvalid, HasSubstr("has numbers at \"names\"")));
+  options.names = {};
+  options.convention = "totalsegmentator";
+  EXPECT_THAT(Read("masks", options), StatusIs(kInvalid, HasSubstr("has a \"convention\"")));
+}
+
+TEST_F(LabelReaderTest, SaysWhatIsWrongWithAFolderOfMasks) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"all_unknown", "none of its 9 files has the name of a known structure: 1 (organ_0), "},
+      {"all_empty", "no voxel of it is labelled"},
+      {"several_labels", "mask \"skull\": it has more than one value besides 0"},
+      {"fractions", "mask \"skull\": it has more than one value besides 0, or fractions"},
+      {"other_grid", "mask \"skull\": its grid is not that of the masks before it"},
+      {"other_size", "mask \"skull\": its grid is not that of the masks before it"},
+      {"swapped_masks", "left and right are swapped"},
+      {"twice", "two files for \"skull\"; keep one"},
+      {"no_masks", "the folder has no .nii, .nii.gz"}};
+  for (const auto& [name, message] : cases) {
+    SCOPED_TRACE(name);
+    const absl::Status status = Read(name).status();
+    EXPECT_EQ(status.code(), kInvalid);
+    EXPECT_THAT(status.message(), AllOf(HasSubstr("cannot use the label map: "), HasSubstr(message),
+                                        Not(HasSubstr("\n")), Not(HasSubstr(folder.string()))));
+  }
+  LabelReadOptions options;
+  options.limits.max_file_bytes = 400;  // of all masks together
+  EXPECT_THAT(Read("masks", options),
+              StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("mask")));
 }
 
 TEST_F(LabelReaderTest, OneLineForTwoHundredSegments) {

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Writes label maps of a phantom with pydicom, nibabel, VTK and Teem's unu: label_reader_test.cc reads them.
+"""Writes label maps of a phantom with pydicom, DCMTK, nibabel, VTK and Teem's unu: label_reader_test.cc reads them.
 
 Usage: write_labels.py DIR.
 """
@@ -16,7 +16,7 @@ import pydicom
 import vtk
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
 from pydicom.sequence import Sequence
-from pydicom.uid import ExplicitVRLittleEndian
+from pydicom.uid import DeflatedExplicitVRLittleEndian, ExplicitVRLittleEndian, RLELossless
 from vtk.util.numpy_support import numpy_to_vtk
 
 # The phantom, as label_reader_test.cc has it: i, j, k, with the last index excluded.
@@ -104,7 +104,7 @@ def code(value, meaning):
     return item
 
 
-def write_seg(path, kind, segments, frame_uid=FRAME_UID, sop_class="1.2.840.10008.5.1.4.1.1.66.4", modality="SEG"):
+def write_seg(path, kind, segments, frame_uid=FRAME_UID, sop_class="1.2.840.10008.5.1.4.1.1.66.4", modality="SEG", syntax=ExplicitVRLittleEndian):
     """`segments`: (label, code, mask) each; `kind`: BINARY, FRACTIONAL or LABELMAP. Only slices that hold something."""
     meta = FileMetaDataset()
     meta.MediaStorageSOPClassUID = sop_class
@@ -167,7 +167,40 @@ def write_seg(path, kind, segments, frame_uid=FRAME_UID, sop_class="1.2.840.1000
     data.PixelData = stored + b"\0" * (len(stored) % 2)
     data["PixelData"].VR = "OB"
     data.is_little_endian, data.is_implicit_VR = True, False
+    if syntax == RLELossless:
+        data.compress(RLELossless, encoding_plugin="pydicom")
+    meta.TransferSyntaxUID = syntax  # pydicom deflates while it writes
     data.save_as(path, write_like_original=False)
+
+
+def write_masks(folder, masks, dtype=np.uint8):
+    """A folder as TotalSegmentator writes it; `masks`: name and values of each."""
+    os.makedirs(folder, exist_ok=True)
+    for name, values in masks.items():
+        write_nifti(os.path.join(folder, name + ".nii.gz"), values.astype(dtype))
+    with open(os.path.join(folder, "statistics.json"), "w", encoding="utf-8") as stream:
+        stream.write("{}")
+
+
+def write_mask_folders(path):
+    empty = np.zeros(SIZE, bool)
+    masks = {"skull": box(SKULL), "mandible": box(MANDIBLE), "inferior_alveolar_canal": box(CANAL)}
+    write_masks(path("masks"), {**masks, "sinus_frontal": empty, "aorta": box(SKULL), "vertebrae_T1": box(CANAL)})
+    write_masks(path("masks_255"), {name: mask * 255 for name, mask in masks.items()}, np.int16)
+    write_masks(path("renamed"), {"Smith_1": box(SKULL), "mandible": box(MANDIBLE), "inferior_alveolar_canal": box(CANAL)})
+    write_masks(path("all_unknown"), {f"organ_{n}": box(SKULL) for n in range(9)})
+    write_masks(path("all_empty"), {"skull": empty, "mandible": empty})
+    write_masks(path("several_labels"), {"skull": numbers()})
+    write_masks(path("fractions"), {"skull": box(SKULL) * 0.3}, np.float32)
+    write_masks(path("other_grid"), masks)
+    shifted = np.diag([-1.5, -1.0, 2.0, 1.0])
+    write_nifti(os.path.join(path("other_grid"), "skull.nii.gz"), box(SKULL).astype(np.uint8), affine=shifted)
+    write_masks(path("other_size"), {**masks, "skull": np.pad(box(SKULL), 1)})
+    write_masks(path("swapped_masks"), {"mandibular_canal_left": box(((3, 5), (6, 10), (3, 6))),
+                                        "mandibular_canal_right": box(((8, 10), (6, 10), (3, 6)))})
+    write_masks(path("twice"), masks)
+    write_nifti(os.path.join(path("twice"), "skull.nii"), box(SKULL).astype(np.uint8))
+    write_masks(path("no_masks"), {})
 
 
 def main(folder):
@@ -212,8 +245,16 @@ def main(folder):
     write_seg(path("binary.dcm"), "BINARY", parts)
     write_seg(path("fractional.dcm"), "FRACTIONAL", parts)
     write_seg(path("labelmap.dcm"), "LABELMAP", parts, sop_class="1.2.840.10008.5.1.4.1.1.66.7")
+    for kind, sop_class in (("BINARY", "1.2.840.10008.5.1.4.1.1.66.4"), ("FRACTIONAL", "1.2.840.10008.5.1.4.1.1.66.4"),
+                            ("LABELMAP", "1.2.840.10008.5.1.4.1.1.66.7")):
+        write_seg(path(f"{kind.lower()}_deflated.dcm"), kind, parts, sop_class=sop_class, syntax=DeflatedExplicitVRLittleEndian)
+        if kind != "BINARY":
+            write_seg(path(f"{kind.lower()}_rle.dcm"), kind, parts, sop_class=sop_class, syntax=RLELossless)
     many = [(f"part {n}", code("1", "?"), box(((n % 20, n % 20 + 1), (3, 9), (3, 5)))) for n in range(197)]
     write_seg(path("many.dcm"), "BINARY", parts + many)
+    # DCMTK's deflated files have an even length, as those of dcmqi.
+    subprocess.run(["dcmconv", "+td", path("binary.dcm"), path("binary_dcmtk.dcm")], check=True)
+    write_mask_folders(path)
     write_seg(path("ct.dcm"), "BINARY", parts, sop_class="1.2.840.10008.5.1.4.1.1.2", modality="CT")
 
 

@@ -36,7 +36,7 @@ struct CutJaw {
 absl::StatusOr<CutJaw> CutAt(const CtVolume& volume, const MetalFindings& findings,
                              double spacing_mm) {
   TF_ASSIGN_OR_RETURN(const HuGrid hu, ResampleIsotropic(volume, spacing_mm, {.threads = 2}));
-  TF_ASSIGN_OR_RETURN(const LabelGrid metal, ResampleMetal(findings, volume, spacing_mm, 2));
+  TF_ASSIGN_OR_RETURN(const LabelGrid metal, ResampleMask(findings.mask, volume, spacing_mm, 2));
   TF_ASSIGN_OR_RETURN(const HeadSegmentation head, SegmentHead(hu, {}, nullptr, metal));
   TF_ASSIGN_OR_RETURN(BoneParts parts, SeparateBoneParts(head));
   TF_ASSIGN_OR_RETURN(const Landmarks landmarks, FindLandmarks(head, parts));

@@ -134,7 +134,7 @@ TEST_F(HeadsBandTest, IsOffByAQuarterOfAStepAtMostOverRandomOperations) {
 TEST_F(HeadsBandTest, IsOffByLessThanAStepOverAllOperations) {
   const MatrixXd compressed = FieldsOf(head->answers);
   ASSERT_OK_AND_ASSIGN(const ElasticSystem* elastic, head->preparation->Elastic({}));
-  ASSERT_OK_AND_ASSIGN(const MaterialExpansion expansion,
+  ASSERT_OK_AND_ASSIGN(const AnswerExpansion expansion,
                        ExpandLinearElastic(head->preparation.get(), *head->problem.uncertainty,
                                            elastic->response_columns(), ExpansionOrder::kFirst));
   std::vector<Vector3d> pivots;

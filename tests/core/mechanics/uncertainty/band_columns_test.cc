@@ -33,7 +33,7 @@ TEST(BandColumnsTest, EqualThatOfTheAnswerItself) {
   const std::vector<int32_t> vertices = AllVertices(bar.mesh);
   const Positions answer = bar.Solve();
   ASSERT_OK_AND_ASSIGN(
-      const MaterialExpansion expansion,
+      const AnswerExpansion expansion,
       ExpandLinearElastic(bar.Prepare().get(), bar.uncertainty, Flat(answer - bar.mesh.positions()),
                           ExpansionOrder::kFirst));
   Eigen::MatrixXf fields(3 * answer.rows(), 4);
@@ -56,7 +56,7 @@ TEST(BandColumnsTest, AreNearThoseOfTheNonlinearModel) {
   const UncertainBar bar(DeformationModel::kNeoHookean);
   const Positions answer = bar.Solve();
   ASSERT_OK_AND_ASSIGN(
-      const MaterialExpansion expansion,
+      const AnswerExpansion expansion,
       ExpandNeoHookean(bar.Prepare().get(), bar.uncertainty, answer, ExpansionOrder::kSecond));
   const Eigen::VectorXd sampled =
       SampleBand(expansion, SurfaceNormals(bar.mesh, answer), /*threads=*/1).size_mm;

@@ -3,10 +3,18 @@
 
 #include "core/mechanics/uncertainty/material_expansion.h"
 
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/mechanics/deformation/create_deformer.h"
+#include "core/mechanics/uncertainty/held_contact.h"
 #include "tests/core/mechanics/uncertainty/uncertain_bar.h"
+#include "tests/testing/parted_block.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform {
@@ -20,10 +28,10 @@ Eigen::VectorXd At(double first, double second, double third) {
   return Eigen::Vector3d(first, second, third);
 }
 
-MaterialExpansion Expand(const UncertainBar& bar, ExpansionOrder order) {
+AnswerExpansion Expand(const UncertainBar& bar, ExpansionOrder order) {
   const auto preparation = bar.Prepare();
   const Positions answer = bar.Solve();
-  absl::StatusOr<MaterialExpansion> expansion =
+  absl::StatusOr<AnswerExpansion> expansion =
       bar.model == DeformationModel::kNeoHookean
           ? ExpandNeoHookean(preparation.get(), bar.uncertainty, answer, order)
           : ExpandLinearElastic(preparation.get(), bar.uncertainty,
@@ -32,8 +40,8 @@ MaterialExpansion Expand(const UncertainBar& bar, ExpansionOrder order) {
   return *std::move(expansion);
 }
 
-const Eigen::MatrixXd& Field(const MaterialExpansion& expansion, int first,
-                             int second = MaterialExpansion::kNone) {
+const Eigen::MatrixXd& Field(const AnswerExpansion& expansion, int first,
+                             int second = AnswerExpansion::kNone) {
   for (const auto& term : expansion.terms) {
     if (term.first == first && term.second == second) return term.field;
   }
@@ -50,7 +58,7 @@ class ElasticExpansionTest : public ::testing::TestWithParam<DeformationModel> {
 // Central differences of answers in full, each with a factor of its own.
 TEST_P(ElasticExpansionTest, FirstOrderEqualsDifferencesOfFullAnswers) {
   const UncertainBar bar(GetParam());
-  const MaterialExpansion expansion = Expand(bar, ExpansionOrder::kFirst);
+  const AnswerExpansion expansion = Expand(bar, ExpansionOrder::kFirst);
   EXPECT_EQ(expansion.variables, 3);
   for (int tissue = 0; tissue < 3; ++tissue) {
     constexpr double kStep = 0.01;
@@ -68,9 +76,100 @@ INSTANTIATE_TEST_SUITE_P(Models, ElasticExpansionTest,
                                                                                  : "NeoHookean";
                          });
 
+// A block with parted lips that are pressed together, of two tissues.
+class PressedLips {
+ public:
+  explicit PressedLips(DeformationModel model) : model_(model), stiffness_(block_.mesh.num_tets()) {
+    for (Eigen::Index t = 0; t < stiffness_.size(); ++t) {
+      const bool is_upper = block_.mesh.positions()(block_.mesh.tets().row(t), 2).mean() > 2;
+      uncertainty_.tissue_of_tet.push_back(is_upper ? 1 : 0);
+      stiffness_[t] = is_upper ? 30000 : 10000;
+    }
+    uncertainty_.tissues = {{"lower", 2}, {"upper", 1.5}};
+    poses_.resize(1);
+    poses_[0].translation_mm = {0.1, -0.05, -0.2};
+  }
+
+  Deformation Solve(const Eigen::Vector2d& z) const {
+    Eigen::VectorXd changed = stiffness_;
+    for (Eigen::Index t = 0; t < changed.size(); ++t) {
+      const int tissue = uncertainty_.tissue_of_tet[static_cast<size_t>(t)];
+      const double factor = uncertainty_.tissues[static_cast<size_t>(tissue)].factor_95;
+      changed[t] *= std::exp(std::log(factor) / kNormal95 * z[tissue]);
+    }
+    DeformerOptions options;
+    options.model = model_;
+    options.neo_hookean.tolerance = 1e-10;
+    return *(*CreateDeformer(Prepare(changed), options))->Deform(poses_);
+  }
+
+  absl::StatusOr<AnswerExpansion> Expand(const Positions& answer) const {
+    const bool is_nonlinear = model_ == DeformationModel::kNeoHookean;
+    const SparseMatrix held =
+        HeldDirections(constraints_, block_.mesh.positions(), poses_, answer, is_nonlinear);
+    const auto preparation = Prepare(stiffness_);
+    if (is_nonlinear) {
+      return ExpandNeoHookean(preparation.get(), uncertainty_, answer, ExpansionOrder::kSecond, {},
+                              &held);
+    }
+    return ExpandLinearElastic(preparation.get(), uncertainty_,
+                               Flat(answer - block_.mesh.positions()), ExpansionOrder::kSecond, {},
+                               &held);
+  }
+
+ private:
+  std::shared_ptr<MeshPreparation> Prepare(const Eigen::VectorXd& stiffness) const {
+    return *MeshPreparation::Create(block_.mesh, stiffness, constraints_, {});
+  }
+
+  DeformationModel model_;
+  testing::PartedBlock block_;
+  ConstraintSet constraints_ = block_.Constraints();
+  Eigen::VectorXd stiffness_;
+  MaterialUncertainty uncertainty_;
+  std::vector<HandlePose> poses_;
+};
+
+TEST_P(ElasticExpansionTest, WithContactItEqualsDifferencesOfFullAnswersThatPressInTheSameRows) {
+  const PressedLips lips(GetParam());
+  const Deformation answer = lips.Solve({0, 0});
+  const auto pressing = [](const Deformation& solved) {
+    return std::ranges::count_if(solved.contact.forces, [](double force) { return force > 0; });
+  };
+  ASSERT_GE(pressing(answer), 3);
+  ASSERT_OK_AND_ASSIGN(const AnswerExpansion expansion, lips.Expand(answer.positions));
+  constexpr double kStep = 0.02;
+  for (int tissue = 0; tissue < 2; ++tissue) {
+    const Eigen::Vector2d z = kStep * Eigen::Vector2d::Unit(tissue);
+    const Deformation stiffer = lips.Solve(z);
+    const Deformation softer = lips.Solve(-z);
+    ASSERT_EQ(pressing(stiffer), pressing(answer));
+    ASSERT_EQ(pressing(softer), pressing(answer));
+    const Eigen::VectorXd first = Flat(stiffer.positions - softer.positions) / (2 * kStep);
+    EXPECT_LT(RelativeError(Field(expansion, tissue), first), 1e-4) << tissue;
+    if (GetParam() != DeformationModel::kLinearElastic) continue;
+    const Eigen::VectorXd second =
+        Flat(stiffer.positions + softer.positions - 2 * answer.positions) / (2 * kStep * kStep);
+    EXPECT_LT(RelativeError(Field(expansion, tissue, tissue), second), 1e-3) << tissue;
+  }
+}
+
+TEST(MaterialExpansionTest, ContactHasToBeSaid) {
+  const testing::PartedBlock block;
+  const Eigen::VectorXd stiffness = Eigen::VectorXd::Constant(block.mesh.num_tets(), 10000);
+  const auto preparation = *MeshPreparation::Create(block.mesh, stiffness, block.Constraints(), {});
+  MaterialUncertainty uncertainty;
+  uncertainty.tissues = {{"all", 2}};
+  uncertainty.tissue_of_tet.assign(static_cast<size_t>(block.mesh.num_tets()), 0);
+  const Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(3 * block.mesh.num_vertices(), 1);
+  EXPECT_THAT(
+      ExpandLinearElastic(preparation.get(), uncertainty, rest, ExpansionOrder::kFirst).status(),
+      StatusIs(absl::StatusCode::kInvalidArgument));
+}
+
 TEST(MaterialExpansionTest, SecondOrderEqualsSecondDifferencesOfFullAnswers) {
   const UncertainBar bar(DeformationModel::kLinearElastic);
-  const MaterialExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
+  const AnswerExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
   constexpr double kStep = 0.05;
   const Eigen::VectorXd pure =
       Flat(bar.Solve(At(kStep, 0, 0)) + bar.Solve(At(-kStep, 0, 0)) - 2 * bar.Solve()) /
@@ -85,11 +184,11 @@ TEST(MaterialExpansionTest, SecondOrderEqualsSecondDifferencesOfFullAnswers) {
 
 TEST(MaterialExpansionTest, ErrorOfSecondOrderIsOfThirdOrder) {
   const UncertainBar bar(DeformationModel::kLinearElastic);
-  const MaterialExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
+  const AnswerExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
   const auto error = [&](const Eigen::VectorXd& z) {
     Eigen::VectorXd sum = Flat(bar.Solve());
     for (const auto& term : expansion.terms) {
-      const double other = term.second == MaterialExpansion::kNone ? 1 : z[term.second];
+      const double other = term.second == AnswerExpansion::kNone ? 1 : z[term.second];
       sum += z[term.first] * other * term.field.col(0);
     }
     return (Flat(bar.Solve(z)) - sum).norm();
@@ -103,7 +202,7 @@ TEST(MaterialExpansionTest, SensitivitiesToAllStiffnessesAtOnceSumToZero) {
   for (const DeformationModel model :
        {DeformationModel::kLinearElastic, DeformationModel::kNeoHookean}) {
     const UncertainBar bar(model);
-    const MaterialExpansion expansion = Expand(bar, ExpansionOrder::kFirst);
+    const AnswerExpansion expansion = Expand(bar, ExpansionOrder::kFirst);
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(3 * bar.mesh.num_vertices());
     double size = 0;
     for (int tissue = 0; tissue < 3; ++tissue) {
@@ -118,7 +217,7 @@ TEST(MaterialExpansionTest, SensitivitiesToAllStiffnessesAtOnceSumToZero) {
 TEST(MaterialExpansionTest, EndsOfTheRangeOfPoissonsRatioAreReachedExactly) {
   UncertainBar bar(DeformationModel::kLinearElastic);
   bar.uncertainty.poisson_ratio_95 = {0.40, 0.49};
-  const MaterialExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
+  const AnswerExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
   EXPECT_EQ(expansion.variables, 4);
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(3);
   for (const int end : {0, 1}) {
@@ -135,9 +234,9 @@ TEST(MaterialExpansionTest, ManyColumnsAreExpandedAsEachByItself) {
   ASSERT_OK_AND_ASSIGN(const ElasticSystem* elastic, preparation->Elastic());
   const Eigen::MatrixXd& columns = elastic->response_columns();
   ASSERT_OK_AND_ASSIGN(
-      const MaterialExpansion together,
+      const AnswerExpansion together,
       ExpandLinearElastic(preparation.get(), bar.uncertainty, columns, ExpansionOrder::kSecond));
-  ASSERT_OK_AND_ASSIGN(const MaterialExpansion alone,
+  ASSERT_OK_AND_ASSIGN(const AnswerExpansion alone,
                        ExpandLinearElastic(preparation.get(), bar.uncertainty, columns.col(7),
                                            ExpansionOrder::kSecond));
   ASSERT_EQ(together.terms.size(), 9);
@@ -149,7 +248,7 @@ TEST(MaterialExpansionTest, ManyColumnsAreExpandedAsEachByItself) {
 
 TEST(MaterialExpansionTest, ConstrainedVerticesAreCertain) {
   const UncertainBar bar(DeformationModel::kNeoHookean);
-  const MaterialExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
+  const AnswerExpansion expansion = Expand(bar, ExpansionOrder::kSecond);
   for (const auto& term : expansion.terms) {
     for (const int32_t vertex : bar.constraints.constrained()) {
       EXPECT_TRUE(term.field.middleRows<3>(3 * vertex).isZero(0));

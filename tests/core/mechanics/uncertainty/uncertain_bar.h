@@ -47,7 +47,7 @@ struct UncertainBar {
     return *MeshPreparation::Create(mesh, pa, constraints, options);
   }
 
-  // The answer in full with variables z of MaterialExpansion for the tissues.
+  // The answer in full with variables z of AnswerExpansion for the tissues.
   Positions Solve(const Eigen::VectorXd& z, double ratio) const {
     Eigen::VectorXd changed = stiffness;
     for (Eigen::Index t = 0; t < changed.size(); ++t) {

@@ -300,7 +300,7 @@ TEST_P(BundledPlanTest, PlannedMoveInvertsNoTetAndMovesTheBoneExactly) {
 
 INSTANTIATE_TEST_SUITE_P(Plans, BundledPlanTest,
                          ::testing::Combine(::testing::Values("head", "head_maxilla", "head_chin",
-                                                              "three_segments"),
+                                                              "head_lips", "three_segments"),
                                             ::testing::ValuesIn(kModels)),
                          [](const auto& test) {
                            return std::string(std::get<0>(test.param)) + "_" +

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "core/imaging/anatomy/bone_parts.h"
 #include "core/imaging/anatomy/osteotomy.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
@@ -51,8 +53,8 @@ struct Column {
   }
 
   absl::StatusOr<PlanningRegions> Assign(double band_mm) const {
-    return AssignRegions(mesh, mesh.num_vertices(), soft_tissue, {"piece"}, band_mm, Landmarks(),
-                         {hu, -500});
+    return AssignRegions(mesh, mesh.num_vertices(), soft_tissue, {"piece"}, {.contact_mm = band_mm},
+                         Landmarks(), {hu, -500});
   }
 
   double Height(Eigen::Index v) const { return mesh.positions()(v, 2); }
@@ -61,6 +63,82 @@ struct Column {
   SoftTissue soft_tissue;
   HuGrid hu;
 };
+
+// A bar of tissue, 2 by 2 by 40 mm, along one bone that is cut at half its height: what is below
+// stays, what is above moves. In front and beside is air.
+struct CutBone {
+  explicit CutBone(uint8_t part_below) : mesh(testing::Bar({1, 1, 20}, 2.0)) {
+    GridGeometry geometry;
+    geometry.size = {2 + 2 * kMargin, 2 + 2 * kMargin, 40 + 2 * kMargin};
+    geometry.origin_mm = Eigen::Vector3d::Constant(0.5 - kMargin);
+    soft_tissue.labels = LabelGrid(geometry);
+    parts = LabelGrid(geometry);
+    hu = HuGrid(geometry, -1000);
+    ForEachVoxelOf(geometry, [&](const Eigen::Vector3i& at, const Eigen::Vector3d& p) {
+      const bool is_below = p.z() < kCutMm;
+      uint8_t& label = soft_tissue.labels.At(at.x(), at.y(), at.z());
+      if (p.x() < 0) {
+        label = is_below ? kFixedBone : kFirstSegment;
+        parts.At(at.x(), at.y(), at.z()) = is_below ? part_below : kMandible;
+      } else if (p.x() < 2 && p.y() > 0 && p.y() < 2 && p.z() > 0 && p.z() < 40) {
+        label = kSoftTissue;
+      }
+      if (label != 0) hu.At(at.x(), at.y(), at.z()) = label == kSoftTissue ? 50 : 1000;
+    });
+    const Plane above_all{Eigen::Vector3d(0, 0, -1000), Eigen::Vector3d::UnitZ()};
+    soft_tissue.region = {above_all, above_all, above_all};
+  }
+
+  template <typename Function>
+  static void ForEachVoxelOf(const GridGeometry& geometry, Function call) {
+    for (int z = 0; z < geometry.size[2]; ++z) {
+      for (int y = 0; y < geometry.size[1]; ++y) {
+        for (int x = 0; x < geometry.size[0]; ++x) call({x, y, z}, geometry.Centre(x, y, z));
+      }
+    }
+  }
+
+  // Of the vertices on the bone, from below: 0 free, 1 held by what stays, 2 by the piece.
+  std::vector<int> Held(double dissected_mm) const {
+    const absl::StatusOr<PlanningRegions> regions =
+        AssignRegions(mesh, mesh.num_vertices(), soft_tissue, {"piece"},
+                      {.contact_mm = 3, .dissected_mm = {dissected_mm}, .parts = &parts},
+                      Landmarks(), {hu, -500});
+    EXPECT_THAT(regions, IsOk());
+    std::vector<int> held(21, -1);
+    for (Eigen::Index v = 0; regions.ok() && v < mesh.num_vertices(); ++v) {
+      if (mesh.positions()(v, 0) != 0 || mesh.positions()(v, 1) != 2) continue;
+      held[std::lround(mesh.positions()(v, 2) / 2)] = regions->anatomy[v];
+    }
+    return held;
+  }
+
+  static constexpr double kCutMm = 21;  // between two rows of vertices
+  TetMesh mesh;
+  SoftTissue soft_tissue;
+  LabelGrid parts;
+  HuGrid hu;
+};
+
+std::vector<int> HeldUpTo(int last_fixed, int first_of_piece) {
+  std::vector<int> held(21, 0);
+  std::fill_n(held.begin(), last_fixed + 1, kFixedBone);
+  std::fill(held.begin() + first_of_piece, held.end(), kFirstSegment);
+  return held;
+}
+
+TEST(PlanningRegionsTest, ACutIsFreeOnBothSidesWhereNothingIsDissected) {
+  // Rows are 2 mm apart; those at 20 and 22 mm are within 3 mm of voxels beyond the cut at 21.
+  EXPECT_EQ(CutBone(kMandible).Held(0), HeldUpTo(9, 12));
+}
+
+TEST(PlanningRegionsTest, WhatIsDissectedIsFreeAndThePieceHoldsUpToTheCut) {
+  EXPECT_EQ(CutBone(kMandible).Held(8), HeldUpTo(6, 11));
+}
+
+TEST(PlanningRegionsTest, BoneOfTheOtherJawIsNotDissected) {
+  EXPECT_EQ(CutBone(kCranium).Held(8), HeldUpTo(9, 12));
+}
 
 TEST(PlanningRegionsTest, BoneHoldsWhatTouchesItAndAirNothing) {
   const Column column(20);

@@ -72,6 +72,8 @@ TEST(RecipeTest, EveryKeyArrives) {
   EXPECT_EQ(recipe.spacing_mm, 2);
   EXPECT_EQ(recipe.segmentation.tissue_above_hu, -400);
   EXPECT_EQ(recipe.segmentation.bone_above_hu, 300);
+  EXPECT_EQ(recipe.segmentation.opening_radius_mm, 5);
+  EXPECT_EQ(recipe.segmentation.smallest_bone_mm3, 99);
   EXPECT_EQ(recipe.occlusal_plane->normal, Eigen::Vector3d(0, 0, 1));
   ASSERT_EQ(recipe.segments.size(), 2U);
   EXPECT_TRUE(recipe.segments[0].planes[0].normal.isApprox(Eigen::Vector3d(0, 0.6, 0.8), 1e-15));
@@ -80,9 +82,17 @@ TEST(RecipeTest, EveryKeyArrives) {
   EXPECT_EQ(recipe.segments[1].kind, OsteotomyKind::kGenioplasty);
   EXPECT_FALSE(recipe.back.has_value());
   EXPECT_EQ(recipe.below->point_mm.z(), -70);
+  EXPECT_EQ(recipe.soft_tissue.thinnest_mm, 4);
   EXPECT_EQ(recipe.soft_tissue.narrowest_neck_mm, 20);
+  EXPECT_EQ(recipe.soft_tissue.smallest_cavity_mm3, 50);
+  EXPECT_EQ(recipe.mesh.edge_mm, 4);
+  EXPECT_EQ(recipe.mesh.fine_edge_mm, 2);
   EXPECT_EQ(recipe.mesh.interior_edge_factor, 2);
+  EXPECT_EQ(recipe.mesh.min_dihedral_deg, 8);
   EXPECT_EQ(recipe.contact_band_mm, 7);
+  ASSERT_EQ(recipe.tissues.size(), 2U);
+  EXPECT_EQ(recipe.tissues[0].hu_below, -10);
+  EXPECT_EQ(recipe.tissues[0].youngs_modulus_pa, 1000);
   EXPECT_EQ(recipe.tissues[1].source, "a book");
   EXPECT_EQ(recipe.poisson_ratio, 0.4);
   EXPECT_EQ(recipe.model, DeformationModel::kLinearElastic);
@@ -141,6 +151,67 @@ TEST(RecipeTest, LabelsAreOfVersion5AndTheFileNameIsNotPassedOn) {
               StatusIs(kInvalid, HasSubstr("use mandible, skull")));
   EXPECT_THAT(parse("5", R"({"names": {"mandible": [0]}})"),
               StatusIs(kInvalid, HasSubstr("/labels/names")));
+}
+
+TEST(RecipeTest, GrayValuesAreOfVersion6) {
+  const auto parse = [](int version, const std::string& ct) {
+    return ParseRecipe(absl::StrCat(R"({"format": "tissueform-recipe", "version": )", version,
+                                    R"(, "segments": [{"name": "chin", "osteotomy": "genioplasty"}],
+                                    "ct": )",
+                                    ct, "}"),
+                       "r");
+  };
+  ASSERT_OK_AND_ASSIGN(const Recipe given, parse(6, R"({"values": "gray", "tissue_above_gray": 242,
+                                                        "bone_above_gray": 605.5})"));
+  EXPECT_EQ(given.ct.values, CtValues::kGray);
+  EXPECT_EQ(given.ct.tissue_above_gray, 242);
+  EXPECT_EQ(given.ct.bone_above_gray, 605.5);
+  const std::string told = RecipeToJson(given);
+  EXPECT_THAT(told, HasSubstr("\"version\": 6"));
+  ASSERT_OK_AND_ASSIGN(const Recipe again, ParseRecipe(told, "again"));
+  EXPECT_EQ(RecipeToJson(again), told);
+  EXPECT_EQ(again.ct.bone_above_gray, 605.5);
+
+  ASSERT_OK_AND_ASSIGN(const Recipe hu, parse(6, R"({"values": "hu"})"));
+  EXPECT_EQ(hu.ct.values, CtValues::kHu);
+  EXPECT_THAT(RecipeToJson(hu), HasSubstr("\"values\": \"hu\""));
+  ASSERT_OK_AND_ASSIGN(const Recipe automatic, parse(6, R"({"values": "auto"})"));
+  EXPECT_EQ(automatic.ct.values, CtValues::kAuto);
+  EXPECT_FALSE(automatic.ct.tissue_above_gray.has_value());
+  EXPECT_FALSE(automatic.ct.bone_above_gray.has_value());
+  EXPECT_THAT(RecipeToJson(automatic), ::testing::Not(HasSubstr("gray")));
+
+  EXPECT_THAT(parse(6, R"({"values": "grey"})"), StatusIs(kInvalid, HasSubstr("/ct/values")));
+  EXPECT_THAT(parse(6, R"({"bone_above_gray": 40000})"),
+              StatusIs(kInvalid, HasSubstr("/ct/bone_above_gray")));
+  EXPECT_THAT(parse(6, R"({"tissue_above_gray": "242"})"),
+              StatusIs(kInvalid, HasSubstr("/ct/tissue_above_gray")));
+  for (const char* const key : {"values\": \"gray", "tissue_above_gray\": \"1"}) {
+    EXPECT_THAT(parse(5, absl::StrCat("{\"", key, "\"}")),
+                StatusIs(kInvalid, HasSubstr("version")));
+  }
+}
+
+TEST(RecipeTest, DissectionIsOfVersion7) {
+  const auto parse = [](int version, const std::string& dissected_mm) {
+    return ParseRecipe(absl::StrCat(R"({"format": "tissueform-recipe", "version": )", version,
+                                    R"(, "segments": [{"name": "chin", "osteotomy": "genioplasty",
+                                    "dissected_mm": )",
+                                    dissected_mm, "}]}"),
+                       "r");
+  };
+  ASSERT_OK_AND_ASSIGN(const Recipe given, parse(7, "6.5"));
+  EXPECT_EQ(given.segments[0].dissected_mm, 6.5);
+  const std::string told = RecipeToJson(given);
+  EXPECT_THAT(told,
+              ::testing::AllOf(HasSubstr("\"version\": 7"), HasSubstr("\"dissected_mm\": 6.5")));
+  ASSERT_OK_AND_ASSIGN(const Recipe again, ParseRecipe(told, "again"));
+  EXPECT_EQ(again.segments[0].dissected_mm, 6.5);
+  for (const char* const wrong : {"-1", "20.5", "\"6\""}) {
+    EXPECT_THAT(parse(7, wrong), StatusIs(kInvalid, HasSubstr("/segments/0/dissected_mm")))
+        << wrong;
+  }
+  EXPECT_THAT(parse(6, "6.5"), StatusIs(kInvalid, HasSubstr("version")));
 }
 
 TEST(RecipeTest, LipsAreOfVersion4) {

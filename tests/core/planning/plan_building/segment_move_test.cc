@@ -57,10 +57,8 @@ RigidMove AMove() {
   return {Eigen::AngleAxisd(0.12, axis.normalized()).toRotationMatrix(), {1, -6, 2}};
 }
 
-TriangleMesh Moved(const TriangleMesh& mesh, const RigidMove& move) {
-  Positions positions = mesh.positions() * move.rotation.transpose();
-  positions.rowwise() += move.translation_mm.transpose();
-  return *TriangleMesh::Create(std::move(positions), mesh.triangles());
+TriangleMesh MovedMesh(const TriangleMesh& mesh, const RigidMove& move) {
+  return *TriangleMesh::Create(Moved(mesh.positions(), move), mesh.triangles());
 }
 
 void ExpectEqual(const RigidMove& a, const RigidMove& b, double tolerance) {
@@ -131,14 +129,14 @@ TEST(SegmentMoveTest, RefusesWhatIsNotRigidWithTheReason) {
 
 TEST(SegmentMoveTest, FitBetweenTheSameTrianglesIsExact) {
   const TriangleMesh egg = Egg(20);
-  const auto fit = FitRigidly(egg, Moved(egg, AMove()));
+  const auto fit = FitRigidly(egg, MovedMesh(egg, AMove()));
   ASSERT_THAT(fit.status(), IsOk());
   ExpectEqual(fit->move, AMove(), 1e-9);
   EXPECT_LT(fit->rms_mm, 1e-9);
 }
 
 TEST(SegmentMoveTest, FitBetweenOtherTrianglesOfOnePieceIsClose) {
-  const auto fit = FitRigidly(Egg(30), Moved(Egg(37), AMove()));
+  const auto fit = FitRigidly(Egg(30), MovedMesh(Egg(37), AMove()));
   ASSERT_THAT(fit.status(), IsOk());
   ExpectEqual(fit->move, AMove(), 0.1);
   EXPECT_LT(fit->rms_mm, 0.1);

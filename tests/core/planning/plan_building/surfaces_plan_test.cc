@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 
+#include "absl/strings/str_replace.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
@@ -17,9 +18,11 @@
 #include "core/planning/plan_building/solid_voxels.h"
 #include "core/planning/plan_building/surfaces_file.h"
 #include "core/planning/plan_io.h"
+#include "core/planning/plan_report/plan_report.h"
 #include "tests/core/imaging/anatomy/head_phantom.h"
 #include "tests/core/planning/plan_building/exported_head.h"
 #include "tests/core/planning/plan_building/plan_comparison.h"
+#include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -28,8 +31,10 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::ContainsRegex;
 using ::testing::Each;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Json = nlohmann::json;
 
 // A folder with the surfaces of the phantom of a head and a file that names them.
@@ -135,6 +140,37 @@ TEST_F(SurfacesPlanTest, PhantomBecomesAPlanWhoseSkinFollowsTheJaw) {
   const Positions moved = answer->positions - problem->mesh->positions();
   EXPECT_GT(MeanBackward(*build, moved, SkinRegion::kChin), 3.5);
   EXPECT_LT(MeanBackward(*build, moved, SkinRegion::kNose), 0.5);
+}
+
+// A file of that folder, without what may name a CT: notes, which say that there was none.
+std::string WithoutNotes(const std::string& path, const PlanBuild& build) {
+  std::string text = BytesOfFile(path);
+  for (const std::string& note : build.ct.notes) {
+    text = absl::StrReplaceAll(text, {{note, ""}});
+  }
+  return text;
+}
+
+TEST_F(SurfacesPlanTest, TheReportNamesSurfacesAndNoCt) {
+  std::filesystem::rename(folder_ + "/skin.stl", folder_ + "/Smith.stl");
+  json_["skin"]["file"] = "Smith.stl";
+  const absl::StatusOr<PlanBuild> build = Build();
+  ASSERT_THAT(build.status(), IsOk());
+  ASSERT_THAT(
+      WritePlanReport(*build, {.program_version = "1", .pictures = false, .tell = {}}, folder_),
+      IsOk());
+  for (const char* const name : {"/report.json", "/report.html"}) {
+    EXPECT_THAT(WithoutNotes(folder_ + name, *build),
+                AllOf(Not(ContainsRegex("[^A-Z]CT[^A-Z]")), Not(HasSubstr("Smith"))))
+        << name;
+  }
+  const Json report = Json::parse(BytesOfFile(folder_ + "/report.json"));
+  EXPECT_EQ(report["input"]["format"], "surfaces");
+  EXPECT_EQ(report["input"]["surfaces"], (Json{"skin", "skull", "lower jaw"}));
+  EXPECT_FALSE(report["input"].contains("ct_sha256"));
+  EXPECT_EQ(report["metal"]["looked_for"], false);
+  EXPECT_THAT(BytesOfFile(folder_ + "/report.html"),
+              HasSubstr("Made from surfaces (skin, skull, lower jaw) by tissueform 1."));
 }
 
 TEST_F(SurfacesPlanTest, UnitsAndAxesDoNotChangeThePlan) {

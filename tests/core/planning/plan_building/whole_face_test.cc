@@ -82,9 +82,10 @@ absl::StatusOr<Face> FaceOf(const HuGrid& ct, const LabelGrid& unscanned = {}) {
   }
   TF_ASSIGN_OR_RETURN(SoftTissueMesh mesh, MeshSoftTissue(tissue.field, options));
   const auto tissue_above_hu = static_cast<double>(head.options.tissue_above_hu);
-  TF_ASSIGN_OR_RETURN(PlanningRegions regions,
-                      AssignRegions(mesh.mesh, mesh.surface.num_vertices(), tissue, {"mandible"}, 3,
-                                    landmarks, {head.hu, tissue_above_hu, &head.cut}));
+  TF_ASSIGN_OR_RETURN(
+      PlanningRegions regions,
+      AssignRegions(mesh.mesh, mesh.surface.num_vertices(), tissue, {"mandible"}, {.contact_mm = 3},
+                    landmarks, {head.hu, tissue_above_hu, &head.cut}));
   return Face{.head = std::move(head),
               .landmarks = landmarks,
               .tissue = std::move(tissue),

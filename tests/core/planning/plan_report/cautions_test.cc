@@ -11,9 +11,11 @@
 namespace tissueform {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 // A CT that begins at z = -101 mm, with the chin at -60 mm.
 PlanBuild WholeHead() {
@@ -33,6 +35,25 @@ TEST(CautionsTest, WhatIsMissingIsTold) {
   build.landmarks.menton.z() = -97;
   EXPECT_THAT(Cautions(build),
               ElementsAre(HasSubstr("nose"), HasSubstr("ends 4 mm below the bony chin")));
+}
+
+// The margin of the grid about the surfaces is not head.
+TEST(CautionsTest, ThoseOfSurfacesNameNoCt) {
+  PlanBuild build = WholeHead();
+  build.surface_roles = {"skin", "skull", "lower jaw"};
+  build.head.head = LabelGrid(build.head.hu.geometry);
+  build.head.head.At(5, 5, 8) = 1;  // z = -84 mm
+  EXPECT_THAT(Cautions(build), IsEmpty());
+  build.landmarks.nose_prominence_mm = 0.24;
+  build.landmarks.menton.z() = -81;
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("flattened in these surfaces"),
+                                           HasSubstr("The skin ends 4 mm below the bony chin")));
+  build.coverage.cuts.resize(1);
+  build.coverage.cuts[0].region_mm2.assign(kNamedSkinRegions.size() + 1, 100);
+  EXPECT_THAT(Cautions(build), Each(Not(HasSubstr("CT"))));
+  EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("An opening of the skin cuts the face"),
+                                           HasSubstr("The surfaces do not contain the whole nose"),
+                                           HasSubstr("4 mm")));
 }
 
 TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {

@@ -15,8 +15,10 @@
 namespace tissueform {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // A bar of 3 x 3 x 4 cubes of 1 mm as if it were the soft tissue of a head.
 PlanBuild BuildOfBar(const TetMesh& mesh) {
@@ -55,6 +57,17 @@ TEST(PlanMeasuresTest, CubesAreMeasuredAsCubes) {
   EXPECT_EQ(measures.bone_mm3[kMandible], 16);
   EXPECT_THAT(measures.tets_of_tissue, ElementsAre(1, 6 * 36 - 1, 0));
   EXPECT_THAT(measures.skin_voxels, ElementsAre(0.5, 1.5));
+}
+
+TEST(PlanMeasuresTest, SurfacesHaveNoSlicesAndNoObjects) {
+  PlanBuild build = BuildOfBar(testing::Bar({3, 3, 4}));
+  build.surface_roles = {"skin"};
+  const std::vector<QualityCheck> checks = CheckQuality(build, MeasurePlan(build));
+  EXPECT_EQ(checks.size(), 10U);
+  for (const QualityCheck& check : checks) {
+    EXPECT_THAT(check.name, AllOf(Not(HasSubstr("CT")), Not(HasSubstr("Objects"))));
+  }
+  EXPECT_EQ(checks[6].name, "Given skin within 0.0 mm of the mesh's, as a whole");
 }
 
 TEST(PlanMeasuresTest, EveryRequirementCanFail) {

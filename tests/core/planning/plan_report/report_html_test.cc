@@ -10,6 +10,7 @@ namespace tissueform {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -56,6 +57,23 @@ TEST(ReportHtmlTest, CautionsHaveASectionIfThereAreAny) {
                                                 HasSubstr("<li>no nose</li>\n<li>no chin")));
   report["cautions"] = nlohmann::ordered_json::array();
   EXPECT_THAT(PlanReportHtml(report, {}), Not(HasSubstr("Limitations of this CT")));
+}
+
+TEST(ReportHtmlTest, HeadingsNameWhatThePlanIsFrom) {
+  nlohmann::ordered_json report = SmallReport(false);
+  EXPECT_THAT(PlanReportHtml(report, {}),
+              AllOf(HasSubstr("<h1>Planning model from a CT: <span class=\"failed\">not ready"),
+                    HasSubstr("Made from a CT ("), HasSubstr("mean distance of the skin to the CT"),
+                    HasSubstr("The CT&#39;s skin in the mesh")));
+  report["input"] = {{"format", "surfaces"}, {"surfaces", {"skin", "lower jaw", kAttack}}};
+  report["distances"] = {{"skin_to_surfaces", {{"mean_mm", 0.25}}}};
+  EXPECT_THAT(
+      PlanReportHtml(report, {}),
+      AllOf(HasSubstr("<h1>Planning model from surfaces: <span class=\"failed\">not ready</span>"),
+            HasSubstr("Made from surfaces (skin, lower jaw, &lt;script&gt;"),
+            HasSubstr("0.25 mm</b><span>mean distance of the skin to the given skin"),
+            HasSubstr("Limitations of these surfaces"), HasSubstr("The given skin in the mesh"),
+            Not(ContainsRegex("[^A-Z]CT[^A-Z]")), Not(HasSubstr("<script"))));
 }
 
 TEST(ReportHtmlTest, TheMouthLineIsDescribedInWords) {

@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-#include "client/pacs_bridge/work/tissueform_command.h"
+#include "core/base/process/tissueform_command.h"
 
 #include <cstdint>
 #include <filesystem>

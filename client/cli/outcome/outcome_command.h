@@ -1,0 +1,13 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include "client/cli/shared/command_line.h"
+
+namespace tissueform {
+
+// `tissueform outcome`: how far a prediction was from the operated face.
+void AddOutcomeCommand(CLI::App& app, CommandWork* work);
+
+}  // namespace tissueform

@@ -1,0 +1,19 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { MeasureResult } from "./evaluation";
+import { type ShownFace, measureFace } from "./face_measures";
+import type { PlanAnswers } from "./whole_band";
+
+/**
+ * The measures with the interval of surgery, model and material together; with that of the material alone where the face is not
+ * the plan's, or the page cannot answer. Takes some dozens of answers: for a face at rest.
+ */
+export async function measureAtRest(face: ShownFace, answers: PlanAnswers): Promise<MeasureResult[]> {
+  const results = measureFace(face);
+  if (!face.showsPlan) return results;
+  const { wholeBands } = await import("./whole_band");
+  const bands = await wholeBands(face, answers).catch(() => null);
+  if (bands === null) return results;
+  return results.map((result) => (result.kind === "value" ? { ...result, band: bands.get(result.definition.name) ?? result.band } : result));
+}

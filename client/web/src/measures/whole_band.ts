@@ -1,0 +1,148 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+import type { CaseFile } from "../case/case_file";
+import { type Pose, movedPoint } from "../geometry/pose";
+import { type Vector, add, apply, cross, fromRotationVector, multiply, norm, scaled, subtract, toRotationVector } from "../geometry/rotation";
+import { pointAt } from "../geometry/rigid_fit";
+import { type Anchor, anchorPoint, corners } from "./anchor";
+import type { Band, BandParts, MeasureResult } from "./evaluation";
+import { type ShownFace, measureAt, shownPoint } from "./face_measures";
+
+/**
+ * Standard deviations, as core/mechanics/uncertainty/surgery_expansion.h and client/cli/shared/total_band.h have them (a test
+ * compares): by how much surgery misses the plan of a segment along and about the patient's left, back and top, and by how much a
+ * predicted place of the skin is off along its normal though bone lies as planned. Sources: docs/accuracy.md, "The whole band".
+ */
+export const DEVIATIONS = {
+  translationMm: [0.82, 1.1, 1.27],
+  rotationDeg: [1.17, 1.17, 1.17],
+  modelMm: 0.89,
+  lipsMm: 1.5,
+} as const;
+
+/** Of the normal distribution: 95 of 100 cases are within so many standard deviations. */
+const NORMAL_95 = 1.96;
+/** Measures are nearly linear over this part of a standard deviation, and positions of single precision still tell it. */
+const STEP = 0.1;
+/** The front of a segment is the mean of this part of its vertices, the foremost ones. */
+const FRONT_PART = 10;
+const LIPS = new Set(["labrale_superius", "stomion_superius", "labrale_inferius", "stomion_inferius"]);
+const RADIANS = Math.PI / 180;
+
+/** What is asked of who knows the plan's answers. */
+export interface PlanAnswers {
+  readonly handles: readonly { readonly name: string }[];
+  /** Of the plan, one for each handle. */
+  poses(): Pose[];
+  /** Where the skin's vertices are under other poses, by surface as of ShownFace; null where that is not known. */
+  skinAt(poses: readonly Pose[]): Promise<((surface: number) => Float32Array) | null>;
+}
+
+/**
+ * Of each measure the interval in which it stays in 95 of 100 cases: surgery, model and material together, all independent and in
+ * first order. Where no band of the material is known the interval is without it. Null where the page cannot answer.
+ */
+export async function wholeBands(face: ShownFace, answers: PlanAnswers): Promise<Map<string, Band> | null> {
+  const places = new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, shownPoint(face, anchor)]));
+  const shown = measureAt(face, (name) => places.get(name) as Vector);
+  const [surgery, model]: Map<string, number>[] = [new Map(), new Map()];
+  const addChange = (variances: Map<string, number>, from: readonly MeasureResult[], to: readonly MeasureResult[], perDeviation: number) => {
+    to.forEach((result, index) => {
+      const before = from[index];
+      if (result.kind !== "value" || before.kind !== "value") return;
+      const change = (result.after - before.after) * perDeviation;
+      variances.set(result.definition.name, (variances.get(result.definition.name) ?? 0) + change * change);
+    });
+  };
+  const measureUnder = async (poses: readonly Pose[]) => {
+    const skin = await answers.skinAt(poses);
+    const byHandle = new Map(answers.handles.map(({ name }, index) => [name, poses[index]]));
+    return skin === null ? null : measureAt(face, (_, anchor) => placeUnder(face, anchor, skin, byHandle));
+  };
+  // What is shown may be the server's full answer: differences are of answers of one kind.
+  const planned = answers.poses();
+  const asPlanned = await measureUnder(planned);
+  if (asPlanned === null) return null;
+  for (const poses of missedPoses(face, answers.handles, planned)) {
+    const missedBy = await measureUnder(poses);
+    if (missedBy === null) return null;
+    addChange(surgery, asPlanned, missedBy, 1 / STEP);
+  }
+  for (const [name, anchor] of face.landmarks.placed) {
+    if (face.file.surfaces[anchor.surface].entry.kind !== "skin") continue;
+    const shifted = add(places.get(name) as Vector, scaled(normalAt(face, anchor), STEP));
+    addChange(model, shown, measureAt(face, (other) => (other === name ? shifted : (places.get(other) as Vector))), (LIPS.has(name) ? DEVIATIONS.lipsMm : DEVIATIONS.modelMm) / STEP);
+  }
+  const partOf = (variances: Map<string, number>, name: string) => NORMAL_95 * Math.sqrt(variances.get(name) ?? 0);
+  return new Map(shown.flatMap((result): [string, Band][] => {
+    if (result.kind !== "value") return [];
+    const { name } = result.definition;
+    return [[name, bandAround(result.after, { surgery: partOf(surgery, name), model: partOf(model, name), material: ofMaterial(result) })]];
+  }));
+}
+
+function bandAround(after: number, parts: BandParts): Band {
+  const half = Math.hypot(parts.surgery, parts.model, parts.material ?? 0);
+  return { lowest: after - half, highest: after + half, parts };
+}
+
+/** Half the interval of the material alone. */
+function ofMaterial(result: MeasureResult): number | null {
+  if (result.kind !== "value" || result.band === null) return null;
+  return (result.band.highest - result.band.lowest) / 2;
+}
+
+/** Each with one segment a part of a standard deviation beside its pose, in one of six ways. */
+function* missedPoses(face: ShownFace, handles: PlanAnswers["handles"], planned: readonly Pose[]): Generator<Pose[]> {
+  for (const [index, { name }] of handles.entries()) {
+    const front = movedPoint(planned[index], frontOf(face.file, name));
+    for (const axis of [0, 1, 2]) {
+      const along = [0, 0, 0].map((_, k) => (k === axis ? 1 : 0)) as Vector;
+      const shift = scaled(along, STEP * DEVIATIONS.translationMm[axis]);
+      const turn = scaled(along, STEP * DEVIATIONS.rotationDeg[axis] * RADIANS);
+      yield planned.map((pose, other) => (other === index ? missed(pose, front, [0, 0, 0], shift) : pose));
+      yield planned.map((pose, other) => (other === index ? missed(pose, front, turn, [0, 0, 0]) : pose));
+    }
+  }
+}
+
+/** `pose`, and then a small turn about `place` and a shift. */
+function missed(pose: Pose, place: Vector, turn: Vector, shift: Vector): Pose {
+  const rotation = fromRotationVector(turn);
+  const movedPivot = add(pose.pivotMm, pose.translationMm);
+  const goal = add(add(place, apply(rotation, subtract(movedPivot, place))), shift);
+  return { ...pose, rotationVector: toRotationVector(multiply(rotation, fromRotationVector(pose.rotationVector))), translationMm: subtract(goal, pose.pivotMm) };
+}
+
+const fronts = new WeakMap<CaseFile, Map<string, Vector>>();
+
+/** The front of a segment at rest, LPS: where its teeth are. */
+function frontOf(file: CaseFile, handle: string): Vector {
+  const known = fronts.get(file) ?? new Map<string, Vector>();
+  fronts.set(file, known);
+  const front = known.get(handle) ?? findFront(file, handle);
+  known.set(handle, front);
+  return front;
+}
+
+function findFront(file: CaseFile, handle: string): Vector {
+  const points = file.surfaces.filter(({ entry }) => entry.handle === handle).flatMap(({ positions }) => Array.from({ length: positions.length / 3 }, (_, vertex) => pointAt(positions, vertex)));
+  points.sort((a, b) => a[1] - b[1]);
+  const front = points.slice(0, Math.max(1, Math.floor(points.length / FRONT_PART)));
+  return scaled(front.reduce(add, [0, 0, 0]), 1 / Math.max(1, front.length));
+}
+
+function placeUnder(face: ShownFace, anchor: Anchor, skin: (surface: number) => Float32Array, poses: ReadonlyMap<string, Pose>): Vector {
+  const { entry, positions, triangles } = face.file.surfaces[anchor.surface];
+  if (entry.kind === "skin") return anchorPoint({ positions: skin(anchor.surface), triangles }, anchor);
+  const point = anchorPoint({ positions, triangles }, anchor);
+  const pose = poses.get(entry.handle);
+  return pose === undefined ? point : movedPoint(pose, point);
+}
+
+function normalAt(face: ShownFace, anchor: Anchor): Vector {
+  const [a, b, c] = corners({ positions: face.positionsOf(anchor.surface), triangles: face.file.surfaces[anchor.surface].triangles }, anchor.triangle);
+  const normal = cross(subtract(b, a), subtract(c, a));
+  return scaled(normal, 1 / Math.max(norm(normal), Number.MIN_VALUE));
+}

@@ -1,0 +1,124 @@
+# Copyright 2026 The Tissueform Authors.
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""A server builds from arrays and files what `tissueform plan build` builds from the CT."""
+
+import gzip
+import json
+import pathlib
+import tempfile
+import unittest
+import unittest.mock
+
+import numpy as np
+import tissueform
+from programs import SERVER, SOURCE, tissueform_command
+from tissueform import Conflict, InvalidInput, LimitExceeded, NotFound, Volume
+from tissueform.plan_builds import FilePayload
+
+CT = SOURCE / "tests/data/ct/headsq/headsq_quarter"
+# The lower face alone, so coarse that it takes seconds.
+RECIPE = {"format": "tissueform-recipe", "version": 1, "spacing_mm": 4, "mesh": {"edge_mm": 8, "fine_edge_mm": 8},
+          "region_of_interest": {"above": {"point_mm": [0, 0, -50], "normal": [0, 0, -1]}, "back": {"point_mm": [0, 100, 0], "normal": [0, -1, 0]}},
+          "segments": [{"name": "mandible", "osteotomy": "bssro", "pose": {"translation_mm": [0, -4, 0]}}]}
+
+
+def head():
+    """The bundled head in HU, from its file, whose axes run to the right, back and down."""
+    raw = gzip.decompress(pathlib.Path(f"{CT}.raw.gz").read_bytes())
+    values = np.frombuffer(raw, dtype="<i2").reshape(93, 64, 64).transpose(2, 1, 0) - 1024
+    return Volume(values, np.diag([-3.2, 3.2, -1.5, 1.0]))
+
+
+class PlanBuildTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server = tissueform.local(SERVER)
+        cls.addClassCleanup(cls.server.close)
+        cls.client = cls.server.connect()
+        cls.addClassCleanup(cls.client.close)
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def test_the_plan_of_an_array_is_that_of_the_command(self):
+        stages = []
+        built = self.client.build_plan(head(), RECIPE, title="study 1", on_progress=lambda stage, done: stages.append((stage, done)))
+        self.assertRegex(built.case, "^cases/[0-9a-f]{64}$")
+        self.assertFalse(built.is_ready)
+        self.assertIn("CT skin", built.defects)
+        self.assertIn("handle  mandible", built.summary)
+        self.assertEqual(stages[0][0], "uploading")
+        self.assertEqual([done for _, done in stages], sorted(done for _, done in stages))
+        plan = tissueform.read_plan(built.save(self.folder / "there"))
+        self.assertEqual(plan.poses["mandible"].translation_mm, (0, -4, 0))
+        (self.folder / "recipe.json").write_text(json.dumps({**RECIPE, "ct": {"hu_offset": -1024, "axes": "RPI"}}))
+        tissueform_command("plan", "build", "--ct", f"{CT}.nhdr", "--recipe", self.folder / "recipe.json", "--out", self.folder / "here",
+                           "--no-pictures", "--accept-defects")
+        for name in ("plan.json", "head.vtu", "viewer.glb"):
+            self.assertEqual((self.folder / "there" / name).read_bytes(), (self.folder / "here" / name).read_bytes(), name)
+        with self.assertRaises(InvalidInput):
+            built.save(self.folder / "there")
+        with self.assertRaises(NotFound):
+            built.read("../record")
+        built.delete()
+        with self.assertRaises(NotFound):
+            built.read("plan.json")
+
+    def test_files_and_labels_go_with_the_recipe(self):
+        points = [[0, 0, -50], [9, 0, -50], [0, 9, -50]]
+        markups = {"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "coordinateUnits": "mm",
+                                "controlPoints": [{"position": point} for point in points]}]}
+        recipe = {**RECIPE, "version": 6, "labels": {"names": {"mandible": [1]}},
+                  "region_of_interest": {**RECIPE["region_of_interest"], "above": {"file": "above.mrk.json"}}}
+        volume = head()
+        far = Volume(np.ones((2, 2, 2), dtype=np.uint8), np.diag([1.0, 1, 1, 1]) + 9000 * np.eye(4, k=3))
+        with self.assertRaisesRegex(Conflict, "the label map does not overlap the CT"):
+            self.client.build_plan(volume, recipe, labels=far, files={"above.mrk.json": json.dumps(markups).encode()})
+
+    def test_an_upload_continues_where_it_broke_off(self):
+        payload = FilePayload(".mha", np.random.default_rng(1).bytes(2 << 20))
+        calls = self.client._plan_builds
+        sent = []
+
+        def interrupt(count, total):
+            sent.append(count)
+            if len(sent) == 3:
+                raise KeyboardInterrupt
+        with self.assertRaises(KeyboardInterrupt):
+            calls._send(payload, interrupt)
+        payload.failure = None
+        again = []
+        calls._send(payload, lambda count, total: again.append(count))
+        self.assertEqual(again[-1], 2 << 20)
+        third = []
+        calls._send(payload, lambda count, total: third.append(count))
+        self.assertEqual(third, [])
+
+    def test_ctrl_c_ends_the_build_on_the_server(self):
+        def interrupt(stage, done):
+            if stage != "uploading":
+                raise KeyboardInterrupt
+        cancel = unittest.mock.Mock(wraps=self.client._plan_builds._cancel)
+        with unittest.mock.patch.object(self.client._plan_builds, "_cancel", cancel), self.assertRaises(KeyboardInterrupt):
+            self.client.build_plan(head(), {**RECIPE, "spacing_mm": 2}, on_progress=interrupt)
+        cancel.assert_called_once()
+
+    def test_failures_are_one_line(self):
+        for recipe, kind, text in (({"segments": []}, Conflict, "recipe"), ({**RECIPE, "spacing": 4}, Conflict, "unknown key"),
+                                   ({"x": {1}}, InvalidInput, "cannot be made JSON"), (self.folder / "none.json", NotFound, "cannot read the recipe")):
+            with self.subTest(text), self.assertRaisesRegex(kind, text) as caught:
+                self.client.build_plan(head(), recipe)
+            self.assertNotIn("\n", str(caught.exception))
+        with tissueform.local(SERVER, options=["--plan-builds", "0"]) as server, server.connect() as client:
+            with self.assertRaisesRegex(Conflict, "builds no plans"):
+                client.build_plan(head(), RECIPE)
+        noise = Volume(np.random.default_rng(1).integers(-1000, 1000, (128, 128, 128)), np.eye(4))
+        with tissueform.local(SERVER, options=["--max-build-file-mib", "1"]) as server, server.connect() as client:
+            with self.assertRaises(LimitExceeded):
+                client.build_plan(noise, RECIPE)
+
+
+if __name__ == "__main__":
+    unittest.main()

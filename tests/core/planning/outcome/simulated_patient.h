@@ -1,0 +1,43 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/mechanics/deformation/model.h"
+#include "core/mechanics/problem/plan_problem.h"
+#include "core/mesh/rigid_move.h"
+#include "core/planning/case_file/case_file.h"
+#include "core/planning/outcome/head_registration.h"
+
+namespace tissueform::testing {
+
+// A bundled plan with its case, as CompareOutcome takes them.
+struct PreOperativeHead {
+  PlanProblem problem;
+  CaseFile contents;
+};
+
+// REQUIRES: a bundled plan with a viewer file ("head", "three_segments").
+PreOperativeHead BundledHead(const std::string& plan);
+
+// Up to so many degrees about any axis, and mm along each.
+RigidMove RandomMove(std::mt19937* random, double most_deg, double most_mm);
+
+// How an operated head is made.
+struct Simulation {
+  DeformationModel model = DeformationModel::kNeoHookean;
+  double stiffer = 1;       // times the plan's stiffness, in the upper half of the mesh
+  double noise_mm = 0.1;    // standard deviation of each coordinate
+  RigidMove position = {};  // of the whole head afterwards
+};
+
+// The head after an operation with these poses (one a handle of the problem). The triangles of skin
+// and bone are other ones than the case's.
+PostOperativeHead OperatedHead(const PreOperativeHead& pre, const std::vector<HandlePose>& poses,
+                               const Simulation& simulation, std::mt19937* random);
+
+}  // namespace tissueform::testing
