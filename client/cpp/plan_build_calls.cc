@@ -174,6 +174,16 @@ absl::Status PlanBuildCalls::Call(
   return RunSessionCall(routes_, "", CallRepeat::kAlways, Deadline(), attempt);
 }
 
+template <typename Request, typename Answer>
+absl::StatusOr<Answer> PlanBuildCalls::Ask(UnaryMethod<Request, Answer> method,
+                                           const Request& request) {
+  Answer answer;
+  TF_RETURN_IF_ERROR(Call([&](grpc::ClientContext* context) {
+    return (stub_.get()->*method)(context, request, &answer);
+  }));
+  return answer;
+}
+
 absl::StatusOr<v1::BuildFile> PlanBuildCalls::Upload(absl::string_view bytes,
                                                      const std::string& suffix,
                                                      const UploadOptions& options,
@@ -183,30 +193,19 @@ absl::StatusOr<v1::BuildFile> PlanBuildCalls::Upload(absl::string_view bytes,
 
 absl::StatusOr<v1::PlanBuild> PlanBuildCalls::Create(v1::CreatePlanBuildRequest request) {
   if (request.request_id().empty()) request.set_request_id(RandomId());
-  v1::PlanBuild made;
-  TF_RETURN_IF_ERROR(Call([&](grpc::ClientContext* context) {
-    return stub_->CreatePlanBuild(context, request, &made);
-  }));
-  return made;
+  return Ask(&Service::CreatePlanBuild, request);
 }
 
 absl::StatusOr<v1::PlanBuild> PlanBuildCalls::Get(const std::string& name) {
   v1::GetPlanBuildRequest request;
   request.set_name(name);
-  v1::PlanBuild found;
-  TF_RETURN_IF_ERROR(Call(
-      [&](grpc::ClientContext* context) { return stub_->GetPlanBuild(context, request, &found); }));
-  return found;
+  return Ask(&Service::GetPlanBuild, request);
 }
 
 absl::StatusOr<v1::PlanBuild> PlanBuildCalls::Cancel(const std::string& name) {
   v1::CancelPlanBuildRequest request;
   request.set_name(name);
-  v1::PlanBuild ended;
-  TF_RETURN_IF_ERROR(Call([&](grpc::ClientContext* context) {
-    return stub_->CancelPlanBuild(context, request, &ended);
-  }));
-  return ended;
+  return Ask(&Service::CancelPlanBuild, request);
 }
 
 absl::Status PlanBuildCalls::Delete(const std::string& name) {
@@ -262,31 +261,20 @@ absl::StatusOr<v1::PlanBuild> PlanBuildCalls::Wait(
 
 absl::StatusOr<v1::BuildDraft> PlanBuildCalls::CreateDraft(
     const v1::CreateBuildDraftRequest& request) {
-  v1::BuildDraft made;
-  TF_RETURN_IF_ERROR(Call([&](grpc::ClientContext* context) {
-    return stub_->CreateBuildDraft(context, request, &made);
-  }));
-  return made;
+  return Ask(&Service::CreateBuildDraft, request);
 }
 
 absl::StatusOr<v1::BuildDraft> PlanBuildCalls::GetDraft(const std::string& name) {
   v1::GetBuildDraftRequest request;
   request.set_name(name);
-  v1::BuildDraft found;
-  TF_RETURN_IF_ERROR(Call([&](grpc::ClientContext* context) {
-    return stub_->GetBuildDraft(context, request, &found);
-  }));
-  return found;
+  return Ask(&Service::GetBuildDraft, request);
 }
 
 absl::StatusOr<std::vector<v1::BuildDraft>> PlanBuildCalls::ListDrafts() {
   std::vector<v1::BuildDraft> drafts;
   v1::ListBuildDraftsRequest request;
   do {
-    v1::ListBuildDraftsResponse page;
-    TF_RETURN_IF_ERROR(Call([&](grpc::ClientContext* context) {
-      return stub_->ListBuildDrafts(context, request, &page);
-    }));
+    TF_ASSIGN_OR_RETURN(v1::ListBuildDraftsResponse page, Ask(&Service::ListBuildDrafts, request));
     std::move(page.mutable_drafts()->begin(), page.mutable_drafts()->end(),
               std::back_inserter(drafts));
     request.set_page_token(page.next_page_token());

@@ -68,7 +68,14 @@ class PlanBuildCalls {
                                        const Cancellation& cancellation = {});
 
  private:
+  using Service = v1::PlanBuildService::StubInterface;
+  template <typename Request, typename Answer>
+  using UnaryMethod = grpc::Status (Service::*)(grpc::ClientContext*, const Request&, Answer*);
+
   absl::Status Call(const std::function<grpc::Status(grpc::ClientContext*)>& attempt);
+  // One answer to one request, repeated as Call does.
+  template <typename Request, typename Answer>
+  absl::StatusOr<Answer> Ask(UnaryMethod<Request, Answer> method, const Request& request);
   // One stream; `last` keeps what it showed last. Errors: those of the stream, also where it ended
   // well but before the build.
   absl::Status WatchOnce(const std::string& name,

@@ -1,13 +1,13 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { execFileSync } from "node:child_process";
-import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import type { Page } from "playwright-core";
+import { record, writeAnimation } from "./animation";
 import { touchDevice } from "./fingers";
 import { IdentityProvider, enterName } from "./identity_provider";
+import { goToStep, openNewPlan, writeHead } from "./new_plan";
 import { type Hook, Planner, live, moved, openCase, openPage, state, takeSegment, typeMove } from "./planner";
 import { SlowLine } from "./slow_line";
 
@@ -286,27 +286,10 @@ test("the page's own answer while the server's is 150 ms away", async () => {
   }
 });
 
-/** Pictures of the page as they were drawn, with the time of each in seconds: those that differ from the one before. */
-async function record(page: Page, act: () => Promise<void>): Promise<{ atSeconds: number; png: Buffer }[]> {
-  const frames: { atSeconds: number; png: Buffer }[] = [];
-  const session = await page.context().newCDPSession(page);
-  session.on("Page.screencastFrame", ({ data, sessionId, metadata }) => {
-    const png = Buffer.from(data, "base64");
-    if (!frames.at(-1)?.png.equals(png)) frames.push({ atSeconds: metadata.timestamp ?? 0, png });
-    // The page may be gone by then.
-    session.send("Page.screencastFrameAck", { sessionId }).catch(() => {});
-  });
-  await session.send("Page.startScreencast", { format: "png", everyNthFrame: 1 });
-  await act();
-  await session.send("Page.stopScreencast");
-  return frames;
-}
-
 const STEPS = 30;
 /** Without a graphics card there are three pictures a second. */
 const FASTER = 3;
 
-// By ImageMagick: the frames one after the other, each with its time.
 test("a drag while every byte is 150 ms late, both ways, as it was seen", async () => {
   const line = await SlowLine.open(planner.url, 150);
   try {
@@ -334,16 +317,51 @@ test("a drag while every byte is 150 ms late, both ways, as it was seen", async 
       await page.mouse.up();
       await page.waitForTimeout(600);
     });
-    const seconds = frames.map(({ atSeconds }) => atSeconds - frames[0].atSeconds);
-    const words = frames.flatMap(({ png }, i) => {
-      const path = join(FOLDER, `late-${String(i).padStart(3, "0")}.png`);
-      writeFileSync(path, png);
-      const standsMs = 1000 * ((seconds[i + 1] ?? seconds[i] + 1) - seconds[i]);
-      return ["(", "-delay", `${Math.max(2, Math.round(standsMs / 10 / FASTER))}x100`, path, "-gravity", "SouthWest", "-fill", "white", "-undercolor", "#000c", "-pointsize", "18", "-annotate", "+8+8", ` ${seconds[i].toFixed(2)} s `, ")"];
-    });
-    execFileSync("convert", [...words, "-resize", "720x", "+dither", "-colors", "48", "+map", "-layers", "Optimize", "-loop", "0", join(FOLDER, "drag-at-150-ms.gif")]);
-    console.log(`${frames.length} frames in ${seconds[seconds.length - 1].toFixed(2)} s`);
+    const seconds = writeAnimation(frames, join(FOLDER, "drag-at-150-ms.gif"), { faster: FASTER });
+    console.log(`${frames.length} frames in ${seconds.toFixed(2)} s`);
   } finally {
     line.close();
   }
 }, 300_000);
+
+/** What waits for the build stands this long at most. */
+const MOST_STANDING_MS = 700;
+
+test("from a CT that is dropped to a face that follows", async () => {
+  const { page } = await openNewPlan(await planner.browse(), planner.url);
+  await page.setViewportSize({ width: 1100, height: 680 });
+  await page.emulateMedia({ colorScheme: "dark" });
+  const frames = await record(page, async () => {
+    const begin = Date.now();
+    await page.getByLabel("Choose files").setInputFiles(writeHead(planner.folder));
+    await page.locator(".plan-views").waitFor();
+    await page.evaluate((ct) => (globalThis as any).tissueform.draft.change({ format: "tissueform-recipe", version: 7, ct }), { hu_offset: -1024 });
+    await goToStep(page, "Operation");
+    await page.waitForTimeout(1500);
+    await page.getByRole("button", { name: "Add", exact: true }).click();
+    await page.getByRole("textbox", { name: "Forward" }).fill("6");
+    await page.getByRole("textbox", { name: "Forward" }).press("Enter");
+    await page.waitForTimeout(2500);
+    await goToStep(page, "Build");
+    await page.getByRole("button", { name: "Build the plan" }).click();
+    const open = page.getByRole("button", { name: "Open the planner" });
+    await open.waitFor({ timeout: 200_000 });
+    const read = page.getByLabel("I have read this");
+    if (await read.isVisible()) {
+      await page.getByText(/^\d+ cautions?$/).click();
+      await page.waitForTimeout(1000);
+      await read.check();
+    }
+    await open.click();
+    await live(page);
+    console.log(`from the drop to the planner: ${((Date.now() - begin) / 1000).toFixed(1)} s, with 5 s of waiting`);
+    await takeSegment(page, "Lower jaw");
+    for (let mm = 1; mm <= 8; ++mm) {
+      await typeMove(page, "Forward", String(mm));
+      await moved(page, 0.5 * mm, 1.5 * mm);
+    }
+    await page.waitForTimeout(800);
+  });
+  const seconds = writeAnimation(frames, join(FOLDER, "ct-to-face.gif"), { faster: 2, mostMs: MOST_STANDING_MS });
+  console.log(`${frames.length} frames in ${seconds.toFixed(2)} s`);
+}, 400_000);

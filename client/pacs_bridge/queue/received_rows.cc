@@ -221,7 +221,9 @@ absl::StatusOr<QueuedSeries> ReceivedRows::SelectOne(const char* sql, const std:
     return absl::OkStatus();
   });
   TF_RETURN_IF_ERROR(done);
-  if (!found.has_value()) return absl::NotFoundError("no such series in the queue");
+  if (!found.has_value()) {
+    return absl::NotFoundError("no such series in the queue; `tissueform-pacs series` lists them");
+  }
   return *std::move(found);
 }
 

@@ -62,7 +62,10 @@ void ReadValuesAndKind(const gdcm::DataSet& groups, DicomHeader* frame) {
   });
   ForEachItem(groups, kFrameContent, [frame](int /*index*/, const gdcm::DataSet& item) {
     frame->acquisition_time_s = SecondsOf(item, kFrameAcquisitionTime);
-    frame->acquisition_number = IntegerOf(item, kFrameAcquisitionNumber);
+    // A US here, where AcquisitionNumber of a slice is text; scanners count from 1.
+    if (const int number = ShortOf(item, kFrameAcquisitionNumber); number > 0) {
+      frame->acquisition_number = number;
+    }
     absl::StrAppend(&frame->reconstruction, "|", ShortOf(item, kTemporalPosition));
   });
   ForEachItem(groups, kFrameTypes, [frame](int /*index*/, const gdcm::DataSet& item) {

@@ -152,7 +152,7 @@ std::vector<DicomFile> PhantomSeries(const SeriesGeometry& geometry) {
 }
 
 DicomFile EnhancedPhantom(const SeriesGeometry& geometry, const std::vector<int>& slices,
-                          bool shared) {
+                          bool shared, const std::vector<uint16_t>& acquisitions) {
   const Eigen::Vector3d& row = geometry.row_direction;
   const Eigen::Vector3d& column = geometry.column_direction;
   const auto add_common = [&](DicomFile* groups) {
@@ -176,6 +176,11 @@ DicomFile EnhancedPhantom(const SeriesGeometry& geometry, const std::vector<int>
     position.Text(DicomFile::kPosition, "DS", Vector(first));
     DicomFile frame;
     frame.Sequence(0x00209113, {position});
+    if (!acquisitions.empty()) {
+      DicomFile content;
+      content.Short(0x00209156, acquisitions[frames.size()]);
+      frame.Sequence(0x00209111, {content});
+    }
     if (!shared) add_common(&frame);
     frames.push_back(frame);
     const std::vector<uint16_t> image = PhantomPixels(geometry, first);

@@ -95,8 +95,9 @@ std::vector<DicomFile> PhantomSeries(const SeriesGeometry& geometry = {});
 
 // Slices of the phantom, by number, as the frames of one file of Enhanced CT. Their pixel spacing,
 // orientation and rescale stand in the shared functional groups, or in those of each frame.
+// `acquisitions`: FrameAcquisitionNumber of each frame; empty: left out.
 DicomFile EnhancedPhantom(const SeriesGeometry& geometry, const std::vector<int>& slices,
-                          bool shared);
+                          bool shared, const std::vector<uint16_t>& acquisitions = {});
 
 // A volume as the slices of a scanner: stored values are HU + 1024. Rows and columns lie as the
 // volume's first two axes.

@@ -3,11 +3,13 @@
 //
 // A whole scan in one file: Enhanced CT, and the plain CT class with several frames.
 
+#include <algorithm>
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
 #include <gdcmWriter.h>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "tests/core/imaging/ct/ct_folder.h"
 #include "tests/testing/status_matchers.h"
@@ -57,6 +59,18 @@ TEST_F(MultiFrameTest, ScanMayBeSpreadOverSeveralFiles) {
   EXPECT_EQ(volume.size[2], 9);
   EXPECT_EQ(WorstPhantomError(volume), 0);
   EXPECT_EQ(volume.provenance.num_files, 2);
+}
+
+// Two scans of the same places, which only the number of the acquisition tells apart.
+TEST_F(MultiFrameTest, ScansOfOneFileAreSeparatedByTheirAcquisitionNumbers) {
+  const std::vector<int> slices = {0, 1, 2, 3, 4, 5, 6, 7, 8, 0, 1, 2, 3, 4, 5, 6, 7};
+  std::vector<uint16_t> acquisitions(slices.size(), 1);
+  std::fill(acquisitions.begin() + 9, acquisitions.end(), uint16_t{2});
+  Write("ct", EnhancedPhantom({}, slices, true, acquisitions).Bytes());
+  ASSERT_OK_AND_ASSIGN(const CtVolume volume, Read());
+  EXPECT_THAT(volume.size, ElementsAre(12, 10, 9));
+  EXPECT_EQ(WorstPhantomError(volume), 0);
+  EXPECT_THAT(volume.provenance.notes, ::testing::Contains(HasSubstr("acquisition number")));
 }
 
 // As cone-beam devices write it: plain CT class, geometry at the top level only.
