@@ -144,6 +144,16 @@ class Client:
         """
         return self._plan_builds.build(ct, recipe, labels, files, title, project, on_progress)
 
+    def build_plan_from_surfaces(self, surfaces: RecipeLike, *, files: Optional[Mapping[str, Union[PathLike, bytes]]] = None, title: str = "",
+                                 project: str = "", on_progress: Optional[Callable[[str, float], None]] = None) -> BuiltPlan:
+        """Lets the server build a plan and its case without a CT, from skin and bones, as `tissueform plan build --surfaces` does.
+
+        surfaces: a dict or the path of a surfaces file (docs/bring-your-own.md); it states units and axes. files: the surfaces that it names,
+        by their names in it; a surfaces file finds them next to itself. All are sent as they are: they must not name the patient. title,
+        project, on_progress, errors: as of build_plan.
+        """
+        return self._plan_builds.build_from_surfaces(surfaces, files, title, project, on_progress)
+
     # Stored predictions.
 
     def prediction(self, name: str) -> StoredPrediction:

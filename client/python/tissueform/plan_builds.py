@@ -1,13 +1,15 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Plans that the server builds from a CT."""
+"""Plans that the server builds from a CT or from surfaces."""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import pathlib
 import time
+import zipfile
 from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Tuple, Union
 
 import grpc
@@ -25,12 +27,13 @@ Files = Mapping[str, Union[PathLike, bytes]]
 StageProgress = Callable[[str, float], None]
 
 _SUFFIXES = (".stl", ".ply", ".obj", ".vtp", ".json", ".tfm", ".h5")
+_NO_DATE = (1980, 1, 1, 0, 0, 0)  # the first that a zip can state: the same files are the same bytes
 _UPLOAD_SHARE = 0.15  # of the whole
 _WATCH_PATIENCE_SECONDS = 60.0
 
 
 class BuiltPlan:
-    """A plan that the server has built, with its case. Made by Client.build_plan.
+    """A plan that the server has built, with its case. Made by Client.build_plan and build_plan_from_surfaces.
 
     name: "planBuilds/{id}". case: "cases/{sha256}", for planners. is_ready: whether the plan meets all requirements; defects: which it
     misses, and by how much. summary: what was made and what to mind, as `tissueform plan build` prints it. files: paths of its files, such
@@ -106,33 +109,33 @@ def _named_files(recipe: Any, place: str = "") -> Iterator[str]:
             yield from _named_files(value, here)
 
 
-def _read_recipe(recipe: RecipeLike) -> Tuple[str, Any, Optional[pathlib.Path]]:
+def _read_recipe(recipe: RecipeLike, what: str = "recipe") -> Tuple[str, Any, Optional[pathlib.Path]]:
     """The text, what it says, and the folder of the file."""
     if isinstance(recipe, Mapping):
         try:
             return json.dumps(recipe), recipe, None
         except (TypeError, ValueError) as error:
-            raise InvalidInput(f"the recipe cannot be made JSON: {error}") from error
+            raise InvalidInput(f"the {what} cannot be made JSON: {error}") from error
     path = pathlib.Path(recipe)
     try:
         text = path.read_text(encoding="utf-8")
         return text, json.loads(text), path.parent
     except OSError as error:
-        raise NotFound(f"cannot read the recipe: {error.strerror}") from error
+        raise NotFound(f"cannot read the {what}: {error.strerror}") from error
     except ValueError as error:
-        raise InvalidInput(f"the recipe is not JSON: {error}") from error
+        raise InvalidInput(f"the {what} is not JSON: {error}") from error
 
 
-def _bytes_of(name: str, files: Files, folder: Optional[pathlib.Path]) -> bytes:
+def _bytes_of(name: str, files: Files, folder: Optional[pathlib.Path], what: str = "recipe") -> bytes:
     source = files.get(name, None if folder is None else folder / name)
     if source is None:
-        raise NotFound(f'the recipe names the file "{name}"', advice="give it in files")
+        raise NotFound(f'the {what} names the file "{name}"', advice="give it in files")
     if isinstance(source, bytes):
         return source
     try:
         return pathlib.Path(source).read_bytes()
     except OSError as error:
-        raise NotFound(f'cannot read "{name}", which the recipe names: {error.strerror}') from error
+        raise NotFound(f'cannot read "{name}", which the {what} names: {error.strerror}') from error
 
 
 def _recipe_files(recipe: Any, files: Files, folder: Optional[pathlib.Path]) -> Dict[str, FilePayload]:
@@ -143,6 +146,16 @@ def _recipe_files(recipe: Any, files: Files, folder: Optional[pathlib.Path]) -> 
             raise InvalidInput(f'the recipe\'s file "{name}" is not one of {" ".join(_SUFFIXES)}')
         payloads[name] = FilePayload(suffix, _bytes_of(name, files, folder))
     return payloads
+
+
+def _zip_of_surfaces(surfaces: RecipeLike, files: Files) -> FilePayload:
+    text, parsed, folder = _read_recipe(surfaces, "surfaces file")
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        for name in sorted({*_named_files(parsed), *files}):
+            archive.writestr(zipfile.ZipInfo(name, _NO_DATE), _bytes_of(name, files, folder, "surfaces file"))
+        archive.writestr(zipfile.ZipInfo("surfaces.json", _NO_DATE), text)
+    return FilePayload(".zip", packed.getvalue())
 
 
 class PlanBuildCalls:
@@ -164,11 +177,22 @@ class PlanBuildCalls:
         volumes = [FilePayload(*file_of(ct, "CT"))]
         if labels is not None:
             volumes.append(FilePayload(*file_of(labels, "label map")))
-        self._upload([*payloads.values(), *volumes], on_progress)
         request = plan_build_service_pb2.CreatePlanBuildRequest(
             recipe_json=text, ct=volumes[0].name, labels=volumes[1].name if labels is not None else "", title=title, project=project,
             recipe_files=[plan_build_service_pb2.RecipeFile(path=name, file=payload.name) for name, payload in payloads.items()],
             request_id=new_id())
+        return self._run([*payloads.values(), *volumes], request, on_progress)
+
+    def build_from_surfaces(self, surfaces: RecipeLike, files: Optional[Files], title: str, project: str,
+                            on_progress: Optional[StageProgress]) -> BuiltPlan:
+        """See Client.build_plan_from_surfaces."""
+        payload = _zip_of_surfaces(surfaces, files or {})
+        request = plan_build_service_pb2.CreatePlanBuildRequest(surfaces=payload.name, title=title, project=project, request_id=new_id())
+        return self._run([payload], request, on_progress)
+
+    def _run(self, payloads: List[FilePayload], request: plan_build_service_pb2.CreatePlanBuildRequest,
+             on_progress: Optional[StageProgress]) -> BuiltPlan:
+        self._upload(payloads, on_progress)
         created = self._caller.unary(self._stub.CreatePlanBuild, request)
         try:
             done = self._wait(created.name, on_progress)

@@ -169,27 +169,43 @@ bool MayBeJoined(const std::vector<Candidate>& candidates) {
   return true;
 }
 
-// `findings`: what the rule says of them; empty where it does not judge.
-absl::Status SeveralWanted(const std::vector<Candidate>& candidates, const std::string& findings) {
+// How the user can say which is meant; several scans of one file cannot be told apart by it.
+std::string WaysToChoose(const std::vector<Candidate>& candidates) {
   std::set<std::optional<int>> numbers;
-  std::set<std::string> patients;
-  std::vector<int> first_files;
+  std::set<int> files;
+  std::vector<std::string> ways;
   for (const Candidate& candidate : candidates) {
     numbers.insert(candidate.group.slices.front().series_number);
-    patients.insert(candidate.group.slices.front().patient);
-    if (first_files.size() < 3) first_files.push_back(candidate.group.slices.front().file_number);
+    files.insert(candidate.group.slices.front().file_number);
   }
-  const bool by_number = numbers.size() == candidates.size();
+  if (numbers.size() == candidates.size()) {
+    ways.emplace_back("choose one with \"series_number\" in the recipe");
+  }
+  if (files.size() == candidates.size()) {
+    std::vector<int> first_files;
+    for (const Candidate& candidate : candidates) {
+      if (first_files.size() < 3) first_files.push_back(candidate.group.slices.front().file_number);
+    }
+    ways.push_back(
+        absl::StrCat("choose one by naming one of its files instead of the folder (file ",
+                     absl::StrJoin(first_files, ", file "), " in the order of names)"));
+  }
+  if (candidates.size() <= 8 && MayBeJoined(candidates)) {
+    ways.emplace_back("read them as one with \"join_series\": \"always\"");
+  }
+  return ways.empty() ? "export one scan as a file of its own" : absl::StrJoin(ways, ", or ");
+}
+
+// `findings`: what the rule says of them; empty where it does not judge.
+absl::Status SeveralWanted(const std::vector<Candidate>& candidates, const std::string& findings) {
+  std::set<std::string> patients;
+  for (const Candidate& candidate : candidates) {
+    patients.insert(candidate.group.slices.front().patient);
+  }
   return absl::InvalidArgumentError(absl::StrCat(
       "the folder holds ", candidates.size(), " CT series",
       patients.size() > 1 ? absl::StrCat(" of ", patients.size(), " patients: ") : ": ",
-      DescribeAll(GroupsOf(candidates)), findings, "; choose one ",
-      by_number ? "with \"series_number\" in the recipe, or " : "",
-      "by naming one of its files instead of the folder (file ",
-      absl::StrJoin(first_files, ", file "), " in the order of names)",
-      candidates.size() <= 8 && MayBeJoined(candidates)
-          ? ", or read them as one with \"join_series\": \"always\""
-          : ""));
+      DescribeAll(GroupsOf(candidates)), findings, "; ", WaysToChoose(candidates)));
 }
 
 // The rule measures single-frame CT slices only.

@@ -5,13 +5,15 @@
 import gzip
 import json
 import pathlib
+import re
+import subprocess
 import tempfile
 import unittest
 import unittest.mock
 
 import numpy as np
 import tissueform
-from programs import SERVER, SOURCE, tissueform_command
+from programs import BIN, SERVER, SOURCE, tissueform_command
 from tissueform import Conflict, InvalidInput, LimitExceeded, NotFound, Volume
 from tissueform.plan_builds import FilePayload
 
@@ -27,6 +29,17 @@ def head():
     raw = gzip.decompress(pathlib.Path(f"{CT}.raw.gz").read_bytes())
     values = np.frombuffer(raw, dtype="<i2").reshape(93, 64, 64).transpose(2, 1, 0) - 1024
     return Volume(values, np.diag([-3.2, 3.2, -1.5, 1.0]))
+
+
+def write_ellipsoid(path, center, radii, steps=24):
+    """An STL file that faces outward. center, radii: mm, LPS."""
+    theta, phi = np.linspace(0, np.pi, steps + 1)[:, None], np.linspace(0, 2 * np.pi, 2 * steps + 1)[None, :]
+    grid = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta) + 0 * phi], axis=-1) * radii + center
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    triangles = np.concatenate([np.stack([a, b, d], axis=2)[1:].reshape(-1, 3, 3), np.stack([b, c, d], axis=2)[:-1].reshape(-1, 3, 3)])
+    records = np.zeros(len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    records["corners"] = triangles
+    path.write_bytes(b"ellipsoid".ljust(80) + np.uint32(len(triangles)).tobytes() + records.tobytes())
 
 
 class PlanBuildTest(unittest.TestCase):
@@ -76,6 +89,29 @@ class PlanBuildTest(unittest.TestCase):
         far = Volume(np.ones((2, 2, 2), dtype=np.uint8), np.diag([1.0, 1, 1, 1]) + 9000 * np.eye(4, k=3))
         with self.assertRaisesRegex(Conflict, "the label map does not overlap the CT"):
             self.client.build_plan(volume, recipe, labels=far, files={"above.mrk.json": json.dumps(markups).encode()})
+
+    def test_surfaces_reach_the_server_as_the_command_reads_them(self):
+        """An ellipsoid is no head: the server refuses it for the reason of the command, which it finds after filling the surfaces."""
+        for name, center, radii in (("skin", (0, 0, 0), (70, 90, 110)), ("skull", (0, 5, 30), (55, 75, 65)), ("jaw", (0, -40, -62), (30, 30, 14))):
+            write_ellipsoid(self.folder / f"{name}.stl", center, radii)
+        surfaces = {"format": "tissueform-surfaces", "version": 1, "spacing_mm": 4, "skin": {"file": "skin.stl"}, "skull": {"file": "skull.stl"},
+                    "lower_jaw": {"file": "jaw.stl"}, "segments": [{"name": "mandible", "surface": "lower_jaw", "pose": {"translation_mm": [0, -4, 0]}}]}
+        path = self.folder / "surfaces.json"
+        path.write_text(json.dumps(surfaces))
+        refused = subprocess.run([BIN / "tissueform", "plan", "build", "--surfaces", path, "--out", self.folder / "out", "--no-pictures"],
+                                 stderr=subprocess.PIPE, text=True)
+        reason = refused.stderr.strip().splitlines()[-1].removeprefix("tissueform: ")
+        self.assertIn("the front of the ramus is not in view", reason)
+        reason = re.escape(reason)
+        stages = []
+        with self.assertRaisesRegex(Conflict, reason):
+            self.client.build_plan_from_surfaces(path, on_progress=lambda stage, _: stages.append(stage))
+        self.assertIn("uploading", stages)
+        files = {f"{name}.stl": self.folder / f"{name}.stl" for name in ("skin", "skull", "jaw")}
+        with self.assertRaisesRegex(Conflict, reason):
+            self.client.build_plan_from_surfaces(surfaces, files=files)
+        with self.assertRaisesRegex(NotFound, 'the surfaces file names the file "jaw.stl"'):
+            self.client.build_plan_from_surfaces(surfaces, files={name: files[name] for name in ("skin.stl", "skull.stl")})
 
     def test_an_upload_continues_where_it_broke_off(self):
         payload = FilePayload(".mha", np.random.default_rng(1).bytes(2 << 20))

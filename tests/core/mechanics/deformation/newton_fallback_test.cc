@@ -240,9 +240,9 @@ TEST(NewtonFallbackTest, MemoryIsAskedForOnceAndTold) {
 TEST(NewtonFallbackTest, WithoutRoomForTheFactorTheSearchGoesOnAndSaysWhyItFailed) {
   DeformControl control;
   control.admission = [](int64_t) { return absl::ResourceExhaustedError("no room"); };
-  const Deformation answer = Solve(PrepareLimb(), {.max_iterations = 300}, {LimbPose()}, control);
+  const Deformation answer = Solve(PrepareLimb(), {.max_iterations = 600}, {LimbPose()}, control);
   EXPECT_FALSE(answer.summary.converged);
-  EXPECT_EQ(answer.summary.iterations, 300);
+  EXPECT_EQ(answer.summary.iterations, 600);
   EXPECT_EQ(answer.summary.newton_steps, 0);
   EXPECT_EQ(answer.summary.gave_up, Termination::kNoRoom);
   EXPECT_EQ(answer.summary.second_factor_bytes, 0);
