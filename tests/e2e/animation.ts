@@ -27,20 +27,33 @@ export async function record(page: Page, act: () => Promise<void>): Promise<Fram
   return frames;
 }
 
-/**
- * By ImageMagick: the frames one after the other, each with its time as recorded, shown `faster`, none longer than `mostMs`.
- * Returns the seconds that were recorded.
- */
+/** Python with Pillow, which matplotlib needs: pictures and milliseconds to an animation with the seconds in a corner. */
+const ASSEMBLE = `
+import json, sys
+from PIL import Image, ImageDraw
+frames = json.load(sys.stdin)
+images = []
+for frame in frames["pictures"]:
+    image = Image.open(frame["path"]).convert("RGB")
+    image = image.resize((frames["width"], round(image.height * frames["width"] / image.width)), Image.LANCZOS)
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((4, image.height - 20, 64, image.height - 4), fill="black")
+    draw.text((8, image.height - 18), frame["label"], fill="white")
+    images.append(image.quantize(64, dither=Image.NONE))
+images[0].save(frames["out"], save_all=True, append_images=images[1:], duration=[frame["ms"] for frame in frames["pictures"]], loop=0, optimize=True)
+`;
+
+/** The frames one after the other, each with its time as recorded, shown `faster`, none longer than `mostMs`. Returns the seconds that were recorded. */
 export function writeAnimation(frames: readonly Frame[], path: string, { faster, mostMs = Infinity }: { faster: number; mostMs?: number }): number {
   const folder = mkdtempSync(join(tmpdir(), "tissueform-frames-"));
   const seconds = frames.map(({ atSeconds }) => atSeconds - frames[0].atSeconds);
-  const words = frames.flatMap(({ png }, i) => {
+  const pictures = frames.map(({ png }, i) => {
     const frame = join(folder, `${i}.png`);
     writeFileSync(frame, png);
-    const standsMs = Math.min(mostMs, (1000 * ((seconds[i + 1] ?? seconds[i] + 1) - seconds[i])) / faster);
-    return ["(", "-delay", `${Math.max(2, Math.round(standsMs / 10))}x100`, frame, "-gravity", "SouthWest", "-fill", "white", "-undercolor", "#000c", "-pointsize", "18", "-annotate", "+8+8", ` ${seconds[i].toFixed(2)} s `, ")"];
+    const standsMs = (1000 * ((seconds[i + 1] ?? seconds[i] + 2) - seconds[i])) / faster;
+    return { path: frame, ms: Math.max(20, Math.round(Math.min(mostMs, standsMs))), label: `${seconds[i].toFixed(2)} s` };
   });
-  execFileSync("convert", [...words, "-resize", "720x", "+dither", "-colors", "48", "+map", "-layers", "Optimize", "-loop", "0", path]);
+  execFileSync("/usr/bin/python3", ["-c", ASSEMBLE], { input: JSON.stringify({ pictures, width: 720, out: path }) });
   rmSync(folder, { recursive: true });
   return seconds[seconds.length - 1];
 }

@@ -93,7 +93,9 @@ function moveRows(plans: readonly TabledPlan[]): Row[] {
 function overlapRow(plans: readonly TabledPlan[]): Row[] {
   const cells = answered(plans, ({ penetrations: { value } }) => {
     const deepest = value.reduce((most, { depthMm }) => Math.max(most, depthMm), 0);
-    return plain(formatNumber(deepest), value.map(({ segment, other }) => `${segment}, ${other}`), deepest > 0 ? "bone overlaps" : "");
+    // Two pieces overlap from either side.
+    const pairs = new Set(value.map(({ segment, other }) => [segment, other].sort().join(" and ")));
+    return plain(formatNumber(deepest), [...pairs], deepest > 0 ? "bone overlaps" : "");
   });
   const row = { id: "overlap", title: "Overlap of bone beyond pre-op, mm", note: "", preOp: ZERO, cells };
   return cells.some((cell) => cell !== null && cell.warning !== "") ? [row] : [];

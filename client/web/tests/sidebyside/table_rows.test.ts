@@ -41,7 +41,7 @@ function plan(file: CaseFile, landmarks: LandmarkBook, { letter, move, skinMm, o
     uncertainty: null,
     displacements: forward(new Float32Array(3 * file.followed.length)),
     shownPoses: new Map([["mandible", moves.poses()[0]]]),
-    penetrations: { value: overlapMm > 0 ? [{ segment: "Lower jaw", other: "the fixed bone", depthMm: overlapMm, points: [] }] : [] },
+    penetrations: { value: overlapMm > 0 ? [["Lower jaw", "Upper jaw"], ["Upper jaw", "Lower jaw"]].map(([segment, other]) => ({ segment, other, depthMm: overlapMm, points: [] })) : [] },
     positionsOf: (surface: number) => (file.surfaces[surface].follows === null ? file.surfaces[surface].positions : forward(file.surfaces[surface].positions)),
     bandOf: () => null,
     largest: () => ({ largestMm: Math.abs(skinMm), band: null }),
@@ -113,7 +113,7 @@ test("targets are reached or missed by plan", () => {
 test("overlap of bone has a row only where a plan has some", () => {
   expect(rowsOf(tableGroups(plans(AT_REST, FORWARD), NO_AIMS)).has("overlap")).toBe(false);
   const rows = rowsOf(tableGroups(plans(AT_REST, { ...FORWARD, overlapMm: 1.25 }), NO_AIMS));
-  expect(rows.get("overlap")?.cells).toMatchObject([{ text: "0.0", warning: "" }, { text: "1.3", warning: "bone overlaps" }]);
+  expect(rows.get("overlap")?.cells).toMatchObject([{ text: "0.0", warning: "" }, { text: "1.3", notes: ["Lower jaw and Upper jaw"], warning: "bone overlaps" }]);
 });
 
 test("a plan that waits for its answer has no number of the face", () => {
