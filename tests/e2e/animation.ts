@@ -27,20 +27,24 @@ export async function record(page: Page, act: () => Promise<void>): Promise<Fram
   return frames;
 }
 
-/** Python with Pillow, which matplotlib needs: pictures and milliseconds to an animation with the seconds in a corner. */
+/** Python with Pillow, which matplotlib needs: pictures and milliseconds to a WebP animation with the seconds in a corner. */
 const ASSEMBLE = `
 import json, sys
 from PIL import Image, ImageDraw
 frames = json.load(sys.stdin)
-images = []
+images, times = [], []
+size = Image.open(frames["pictures"][-1]["path"]).size
 for frame in frames["pictures"]:
     image = Image.open(frame["path"]).convert("RGB")
+    if image.size != size:
+        continue  # before the window had its size
+    times.append(frame["ms"])
     image = image.resize((frames["width"], round(image.height * frames["width"] / image.width)), Image.LANCZOS)
     draw = ImageDraw.Draw(image)
     draw.rectangle((4, image.height - 20, 64, image.height - 4), fill="black")
     draw.text((8, image.height - 18), frame["label"], fill="white")
-    images.append(image.quantize(64, dither=Image.NONE))
-images[0].save(frames["out"], save_all=True, append_images=images[1:], duration=[frame["ms"] for frame in frames["pictures"]], loop=0, optimize=True)
+    images.append(image)
+images[0].save(frames["out"], save_all=True, append_images=images[1:], duration=times, loop=0, quality=60)
 `;
 
 /** The frames one after the other, each with its time as recorded, shown `faster`, none longer than `mostMs`. Returns the seconds that were recorded. */

@@ -317,7 +317,7 @@ test("a drag while every byte is 150 ms late, both ways, as it was seen", async 
       await page.mouse.up();
       await page.waitForTimeout(600);
     });
-    const seconds = writeAnimation(frames, join(FOLDER, "drag-at-150-ms.gif"), { faster: FASTER });
+    const seconds = writeAnimation(frames, join(FOLDER, "drag-at-150-ms.webp"), { faster: FASTER });
     console.log(`${frames.length} frames in ${seconds.toFixed(2)} s`);
   } finally {
     line.close();
@@ -335,7 +335,10 @@ test("from a CT that is dropped to a face that follows", async () => {
     const begin = Date.now();
     await page.getByLabel("Choose files").setInputFiles(writeHead(planner.folder));
     await page.locator(".plan-views").waitFor();
-    await page.evaluate((ct) => (globalThis as any).tissueform.draft.change({ format: "tissueform-recipe", version: 7, ct }), { hu_offset: -1024 });
+    await goToStep(page, "CT");
+    await page.getByText("What the file does not say").click();
+    await page.getByRole("textbox", { name: "Add to values to get HU" }).fill("-1024");
+    await page.getByRole("textbox", { name: "Add to values to get HU" }).press("Enter");
     await goToStep(page, "Operation");
     await page.waitForTimeout(1500);
     await page.getByRole("button", { name: "Add", exact: true }).click();
@@ -362,6 +365,6 @@ test("from a CT that is dropped to a face that follows", async () => {
     }
     await page.waitForTimeout(800);
   });
-  const seconds = writeAnimation(frames, join(FOLDER, "ct-to-face.gif"), { faster: 2, mostMs: MOST_STANDING_MS });
+  const seconds = writeAnimation(frames, join(FOLDER, "ct-to-face.webp"), { faster: 2, mostMs: MOST_STANDING_MS });
   console.log(`${frames.length} frames in ${seconds.toFixed(2)} s`);
 }, 400_000);

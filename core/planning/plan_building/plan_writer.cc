@@ -144,13 +144,14 @@ absl::Status WriteSegments(const PlanBuild& build, const std::filesystem::path& 
 absl::Status WriteViewer(const PlanBuild& build, const std::filesystem::path& folder) {
   TF_ASSIGN_OR_RETURN(const std::string mesh_sha256, MeshFileSha256((folder / kMeshFile).string()));
   const std::vector<std::string> segments = NamesOf(build.segments);
-  TF_ASSIGN_OR_RETURN(const std::string bytes,
-                      SerializeViewer({.mesh_file_sha256 = mesh_sha256,
-                                       .surfaces = build.viewer_surfaces,
-                                       .landmarks = MakeViewerLandmarks(
-                                           build.landmarks, build.frankfort, build.bone, segments,
-                                           build.viewer_surfaces.front()),
-                                       .head_frame = build.head_frame}));
+  TF_ASSIGN_OR_RETURN(
+      const std::string bytes,
+      SerializeViewer({.mesh_file_sha256 = mesh_sha256,
+                       .surfaces = build.viewer_surfaces,
+                       .landmarks = MakeViewerLandmarks(build.landmarks, build.frankfort,
+                                                        build.bone, build.parts.labels, segments,
+                                                        build.viewer_surfaces.front()),
+                       .head_frame = build.head_frame}));
   return WriteFileAtomically((folder / kViewerFile).string(), bytes);
 }
 

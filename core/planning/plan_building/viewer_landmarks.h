@@ -21,12 +21,13 @@ namespace tissueform {
 //   skin            pronasale (where the nose is whole), subnasale, labrale_superius,
 //   labrale_inferius, soft_pogonion
 //
-// A landmark of bone moves with the segment whose voxels lie nearest to it (up to 4 mm), one of the
-// skin with the nearest vertex of `skin`. `bone` has kFixedBone and from kFirstSegment on the
-// segments, whose names these are.
+// A landmark of bone moves with the segment of its own jaw whose voxels lie nearest to it (up to
+// 4 mm; nearer bone that stays holds it), one of the skin with the nearest vertex of `skin`. `bone`
+// has kFixedBone and from kFirstSegment on the segments, whose names these are; `parts`, on the
+// same grid, are BoneParts::labels.
 std::vector<CaseLandmark> MakeViewerLandmarks(const Landmarks& landmarks,
                                               const std::optional<FrankfortLandmarks>& frankfort,
-                                              const LabelGrid& bone,
+                                              const LabelGrid& bone, const LabelGrid& parts,
                                               const std::vector<std::string>& segments,
                                               const CaseSurface& skin);
 
