@@ -18,6 +18,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 
 import yaml
 
@@ -146,6 +147,16 @@ def is_healthy(service, port):
     return run(*words).returncode == 0
 
 
+def becomes_healthy(service, port):
+    """Compose asks again as well: a gateway listens before it has reached its server."""
+    end = time.monotonic() + PATIENCE_S
+    while not is_healthy(service, port):
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.1)
+    return True
+
+
 def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -159,7 +170,7 @@ def health_faults(programs, objects):
         gateway_words = ("--listen", "127.0.0.1:0", "--web", web, "--server")
         with Started(programs / NAMES["server"], "--in-memory", "--port", "0") as server:
             with Started(programs / NAMES["gateway"], *gateway_words, f"127.0.0.1:{server.port}") as gateway:
-                if not is_healthy(services["server"], server.port) or not is_healthy(services["gateway"], gateway.port):
+                if not becomes_healthy(services["server"], server.port) or not becomes_healthy(services["gateway"], gateway.port):
                     yield "a health check fails on a healthy program"
         with Started(programs / NAMES["gateway"], *gateway_words, f"127.0.0.1:{free_port()}") as gateway:
             if is_healthy(services["gateway"], gateway.port):
