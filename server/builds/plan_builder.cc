@@ -168,11 +168,22 @@ absl::StatusOr<std::string> StoreCase(const PlanBuildJob& job, const std::string
   return record.sha256;
 }
 
-// Messages of programs name the files that they were given.
+// Paths below a folder become names of files.
+void KeepFileNames(const std::string& folder, std::string* message) {
+  const std::string prefix = folder + "/";
+  for (size_t at = message->find(prefix); at != std::string::npos; at = message->find(prefix, at)) {
+    const size_t end =
+        std::min(message->find_first_of(" :,;\"'()", at + prefix.size()), message->size());
+    message->erase(at, message->rfind('/', end - 1) + 1 - at);
+  }
+}
+
+// Messages of programs name the files that they were given: a recipe's by its paths in it, those of
+// a zip, which is unpacked next to the result, by their names.
 absl::Status WithoutPaths(const absl::Status& status, const PlanBuildJob& job) {
-  std::string message = absl::StrReplaceAll(status.message(), {{job.work_folder + "/recipe/", ""},
-                                                               {job.work_folder + "/", ""},
-                                                               {job.result_folder, "plan"}});
+  std::string message = absl::StrReplaceAll(
+      status.message(), {{job.work_folder + "/recipe/", ""}, {job.work_folder + "/", ""}});
+  KeepFileNames(std::filesystem::path(job.result_folder).parent_path().string(), &message);
   if (absl::StrContains(message, "bytes of memory")) {
     absl::StrAppend(&message, " (--max-build-memory-mib); crop the CT, or ask the operator");
   }

@@ -53,7 +53,7 @@ std::string SuffixOf(const fs::path& path) {
   return absl::EndsWith(path.string(), ".nii.gz") ? ".nii.gz" : path.extension().string();
 }
 
-// A path below a folder and nothing else, whatever the server says.
+// Only a path below a folder: the server is not trusted with others.
 bool IsInside(absl::string_view path) {
   if (path.empty() || path.find('\0') != absl::string_view::npos) return false;
   const std::vector<absl::string_view> parts = absl::StrSplit(path, '/');
@@ -157,7 +157,7 @@ class ServerBuild {
     absl::StatusOr<v1::PlanBuild> done = calls_->Wait(
         created.name(), [this](const v1::PlanBuild& build) { Tell(build); }, cancellation_);
     if (cancellation_.requested()) {
-      // Also where it is done by now: nobody waits for it.
+      // Also where it is done by now: its result is not wanted.
       TF_RETURN_IF_ERROR(calls_->Cancel(created.name()).status());
       return absl::CancelledError("the build was cancelled");
     }

@@ -7,6 +7,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 import pathlib
 import time
 import zipfile
@@ -116,6 +117,8 @@ def _read_recipe(recipe: RecipeLike, what: str = "recipe") -> Tuple[str, Any, Op
             return json.dumps(recipe), recipe, None
         except (TypeError, ValueError) as error:
             raise InvalidInput(f"the {what} cannot be made JSON: {error}") from error
+    if not isinstance(recipe, (str, os.PathLike)):
+        raise InvalidInput(f"the {what} is neither a dict nor the path of a file")
     path = pathlib.Path(recipe)
     try:
         text = path.read_text(encoding="utf-8")

@@ -110,6 +110,11 @@ class PlanBuildTest(unittest.TestCase):
         files = {f"{name}.stl": self.folder / f"{name}.stl" for name in ("skin", "skull", "jaw")}
         with self.assertRaisesRegex(Conflict, reason):
             self.client.build_plan_from_surfaces(surfaces, files=files)
+        with self.assertRaisesRegex(Conflict, "^surfaces surfaces.json: skin: cannot read mesh skin.stl: ") as caught:
+            self.client.build_plan_from_surfaces(surfaces, files={**files, "skin.stl": b"no surface"})
+        self.assertNotIn("/", str(caught.exception), "folders of the server")
+        with self.assertRaisesRegex(InvalidInput, "neither a dict nor the path"):
+            self.client.build_plan_from_surfaces([surfaces])
         with self.assertRaisesRegex(NotFound, 'the surfaces file names the file "jaw.stl"'):
             self.client.build_plan_from_surfaces(surfaces, files={name: files[name] for name in ("skin.stl", "skull.stl")})
 
