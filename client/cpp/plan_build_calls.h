@@ -24,7 +24,7 @@ namespace tissueform {
 
 // Plans that a server builds from volumes and recipes: the rpcs of PlanBuildService. Got from
 // TissueformClient, whose contract it shares: calls block, each with a deadline, and errors carry
-// the server's code, message and reason. A file is uninterpreted bytes here; whoever sends it has
+// the server's code, message and reason. A file is uninterpreted bytes here; the sender has
 // removed what names the patient.
 //
 // Thread-safe.

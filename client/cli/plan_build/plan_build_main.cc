@@ -88,7 +88,7 @@ absl::StatusOr<std::string> ResolveCt(const PlanBuildRequest& request, ZipInputs
 absl::StatusOr<PlanBuild> BuildFromInput(const PlanBuildRequest& request,
                                          const StageFunction& tell) {
   const PlanBuildOptions options{.threads = request.threads, .tell = Within(tell, 0, kBuildShare)};
-  // Whoever called removes the folder after an error, also when this process is killed.
+  // The caller removes the folder after an error, also when this process is killed.
   ZipInputs zips(request.folder);
   if (!request.surfaces.empty()) {
     TF_ASSIGN_OR_RETURN(const std::string surfaces,

@@ -204,7 +204,7 @@ class ServerBuild {
   const EndingSignals& signals_;
   const Cancellation cancellation_;
   StageTimes times_;
-  std::string stage_;  // of the server, as told last
+  std::string stage_;  // of the server, that was shown last
 };
 
 }  // namespace

@@ -59,8 +59,8 @@ absl::StatusOr<QueuedSeries> ExportWork::SeriesOfCase(const std::string& case_na
   DraftRows rows(queue_);
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedDraft> drafts, rows.List());
   if (drafts.empty()) return known;
-  TF_ASSIGN_OR_RETURN(const std::vector<v1::BuildDraft> told, server_->ListDrafts());
-  for (const v1::BuildDraft& one : told) {
+  TF_ASSIGN_OR_RETURN(const std::vector<v1::BuildDraft> listed, server_->ListDrafts());
+  for (const v1::BuildDraft& one : listed) {
     if (std::find(one.cases().begin(), one.cases().end(), case_name) == one.cases().end()) continue;
     const auto draft = std::ranges::find(drafts, one.name(), &QueuedDraft::name);
     if (draft == drafts.end()) continue;

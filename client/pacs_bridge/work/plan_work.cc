@@ -250,28 +250,28 @@ absl::StatusOr<std::vector<std::string>> PlanWork::FollowDrafts() {
   std::vector<std::string> changed;
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedDraft> drafts, drafts_.List());
   if (drafts.empty() || server_ == nullptr) return changed;
-  TF_ASSIGN_OR_RETURN(const std::vector<v1::BuildDraft> told, server_->ListDrafts());
+  TF_ASSIGN_OR_RETURN(const std::vector<v1::BuildDraft> listed, server_->ListDrafts());
   for (const QueuedDraft& draft : drafts) {
-    const auto found = std::find_if(told.begin(), told.end(), [&draft](const v1::BuildDraft& one) {
-      return one.name() == draft.name;
-    });
+    const auto found =
+        std::find_if(listed.begin(), listed.end(),
+                     [&draft](const v1::BuildDraft& one) { return one.name() == draft.name; });
     TF_ASSIGN_OR_RETURN(const bool has_changed,
-                        found == told.end() ? TakeLoss(draft) : TakeCases(draft, *found));
+                        found == listed.end() ? TakeLoss(draft) : TakeCases(draft, *found));
     if (has_changed) changed.push_back(draft.series);
   }
   return changed;
 }
 
-absl::StatusOr<bool> PlanWork::TakeCases(const QueuedDraft& draft, const v1::BuildDraft& told) {
-  if (told.cases().empty()) return false;
-  for (const std::string& name : told.cases()) TF_RETURN_IF_ERROR(drafts_.AddCase(draft, name));
+absl::StatusOr<bool> PlanWork::TakeCases(const QueuedDraft& draft, const v1::BuildDraft& listed) {
+  if (listed.cases().empty()) return false;
+  for (const std::string& name : listed.cases()) TF_RETURN_IF_ERROR(drafts_.AddCase(draft, name));
   TF_FAULT_POINT("plan.case_noted");
   TF_ASSIGN_OR_RETURN(QueuedSeries series, rows_.Get(draft.series));
-  const std::string& last = told.cases(told.cases_size() - 1);
+  const std::string& last = listed.cases(listed.cases_size() - 1);
   const SeriesState before = series.state;
   // A plan that was built of the series otherwise stays the one that is shown.
-  const bool is_of_draft =
-      std::find(told.cases().begin(), told.cases().end(), series.case_name) != told.cases().end();
+  const bool is_of_draft = std::find(listed.cases().begin(), listed.cases().end(),
+                                     series.case_name) != listed.cases().end();
   if (before != SeriesState::kDraft && (!is_of_draft || series.case_name == last)) return false;
   series.case_name = last;
   series.state = SeriesState::kPublished;

@@ -82,7 +82,7 @@ class PlanWork {
   // What was sent of the series before, and nothing was built of.
   absl::Status RemoveDrafts(const std::string& series);
   // True: its series has changed.
-  absl::StatusOr<bool> TakeCases(const QueuedDraft& draft, const v1::BuildDraft& told);
+  absl::StatusOr<bool> TakeCases(const QueuedDraft& draft, const v1::BuildDraft& listed);
   absl::StatusOr<bool> TakeLoss(const QueuedDraft& draft);
   absl::Status Pack(QueuedSeries* series);
   absl::Status Publish(QueuedSeries* series);

@@ -34,7 +34,7 @@ export class BonePreview {
     this.worker.onerror = () => this.listener.onProblem("The preview of the bone has stopped: reload the page; the recipe stays.");
   }
 
-  /** `threshold`: in the volume's own values. Rejects when it was ended meanwhile. */
+  /** `threshold`: in the volume's own values. Rejects when it is ended first. */
   async load(volume: Volume, threshold: number, labels: LabelMap | null, recipe: Recipe): Promise<void> {
     const { grid, values } = await reduceVolume(volume, PREVIEW_MM, this.ending.signal);
     const structures = labels === null ? new Map<number, Structure>() : structuresOf(labels, recipe);

@@ -59,7 +59,7 @@ function segmentFact({ name, planes = [] }: BuildReport["segments"][number]): st
   return `${name} was cut by ${planes.length} ${planes.length === 1 ? "plane" : "planes"}.`;
 }
 
-/** Cautions, in a part that is opened; `onOpen` is told when it is first. */
+/** Cautions, in a part that is opened; `onOpen` is called when it is first. */
 export function cautionsBox(report: BuildReport, onOpen: () => void): HTMLDetailsElement {
   const items = report.cautions.map((text) => el("li", { text }));
   const title = report.cautions.length === 1 ? "1 caution" : `${report.cautions.length} cautions`;

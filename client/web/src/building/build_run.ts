@@ -9,7 +9,7 @@ import { removeBuildFile, uploadBuildFile } from "../live/build_upload";
 import { clipTitle } from "../live/upload";
 
 const PAGE_SIZE = 100;
-/** A watch that breaks off is begun again; a server that is gone for longer than this many times in a row is told. */
+/** A watch that breaks off is begun again; a server that is gone for longer than this many times in a row is reported. */
 const MOST_WATCHES = 8;
 const WATCH_AGAIN_MS = 1500;
 const MOST_FILE_BYTES = 64 * 2 ** 20;
