@@ -73,7 +73,7 @@ based=$((SECONDS - begin))
 
 begin=$SECONDS
 authorities=()
-# npm in the builder trusts whom this machine trusts.
+# npm in the builder trusts the authorities that this machine trusts.
 if [[ -z $packages && -e /etc/ssl/certs/ca-certificates.crt ]]; then
   authorities=(--secret "id=authorities,src=/etc/ssl/certs/ca-certificates.crt")
 fi

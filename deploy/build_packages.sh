@@ -122,7 +122,7 @@ make_package() {
       more=$'Suggests: haproxy, tissueform-server\n'
       ;;
     tissueform-pacs)
-      # Which PACS there is, somebody must say first.
+      # It does not start by itself: the administrator must configure the PACS first.
       add_service "$package" "$tree" "$package" /var/lib/tissueform-pacs pacs.ini no
       install -Dm 644 -t "$tree/etc/tissueform" deploy/config/series-rules.json
       install -Dm 644 deploy/pacs/recipe.json "$tree/etc/tissueform/series-recipe.json"

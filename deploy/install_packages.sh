@@ -51,7 +51,7 @@ if [[ $(id -u) -ne 0 ]]; then
 fi
 
 echo "Installing ${#missing[@]} Debian packages: ${missing[*]}"
-# A broken list of somebody else's archive is no reason to stop: what we need may be at hand.
+# A broken package list of a third-party archive is not fatal: the needed packages may be available.
 "${as_root[@]}" apt-get update -qq || echo "install_packages.sh: apt-get update failed; going on" >&2
 "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
   apt-get install -y -qq --no-install-recommends "${missing[@]}"

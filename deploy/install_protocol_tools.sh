@@ -18,7 +18,7 @@ if [[ $(node_modules/buf --version 2>/dev/null || true) == "$wanted" && -d node_
   exit 0
 fi
 
-# Debian's npm where there is none: other sources of Node bring their own, and cannot stand beside it.
+# Debian's npm if npm is missing: other sources of Node bring their own npm, which conflicts with Debian's.
 command -v npm >/dev/null || ../install_packages.sh protocol
 npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
 (cd node_modules && ln -sf @bufbuild/buf-linux-*/bin/buf buf)

@@ -57,7 +57,7 @@ absl::Status AnswerWasLost() {
 }
 
 void AddSessionHeader(const std::string& session, grpc::ClientContext* context) {
-  // Not of a name that is none: the server refuses it, and a header takes only some letters.
+  // Not for an invalid name: the server refuses it, and a header takes only some letters.
   if (const absl::StatusOr<std::string> id = ParseSessionName(session); id.ok()) {
     context->AddMetadata(kSessionHeader, *id);
   }

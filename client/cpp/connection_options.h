@@ -9,8 +9,8 @@ namespace tissueform {
 
 // How a server is reached and who one is there. Files are PEM.
 struct ConnectionOptions {
-  // Encrypted, to a server whose certificate names the host that was given; so is whatever names a
-  // file of TLS.
+  // Encrypted, to a server whose certificate names the host that was given; any TLS file below
+  // also turns encryption on.
   bool tls = false;
   std::string tls_ca = {};  // authorities of the server's certificate; empty: the system's
   // One's own certificate and its key, for servers that ask for one.

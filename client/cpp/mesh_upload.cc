@@ -105,8 +105,8 @@ class Sending {
     return true;
   }
 
-  // Whether the same bytes may be taken another time. Damage on the way is mended by
-  // sending again, but not for ever.
+  // Whether the same bytes may be taken another time. Sending again repairs damage in
+  // transit, but the client does that only once.
   bool MayRepeat(const absl::Status& status) {
     if (absl::IsResourceExhausted(status)) return false;
     if (absl::IsDataLoss(status)) return !std::exchange(damaged_before_, true);

@@ -17,7 +17,7 @@
 namespace tissueform {
 
 // A session on a server that was made from a plan, whether that was read from files or has just
-// been built (core/mechanics/problem). It is deleted with this object, whatever happens in between.
+// been built (core/mechanics/problem). It is deleted with this object, also after errors.
 class PlanSession {
  public:
   // Uploads the mesh with the stiffness of its tets unless the server has both, and makes the
@@ -26,8 +26,8 @@ class PlanSession {
   // Errors: those of UploadMesh and CreateSession.
   static absl::StatusOr<std::unique_ptr<PlanSession>> Create(TissueformClient* client,
                                                              const PlanProblem& problem);
-  // The same for somebody who waits for it. Where `stream` is given, what a stream with these
-  // options asks for is made ready, too. Errors: and those of PrepareSession.
+  // The same for a caller that waits for it. Where `stream` is given, what a stream with these
+  // options asks for is made ready, too. Errors: also those of PrepareSession.
   static absl::StatusOr<std::unique_ptr<PlanSession>> Create(
       TissueformClient* client, const PlanProblem& problem, const PreparationWait& wait,
       const DeformStream::Options* stream = nullptr);

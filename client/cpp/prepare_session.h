@@ -15,7 +15,7 @@
 
 namespace tissueform {
 
-// How somebody waits for a session. Both are used on the thread that waits.
+// How a caller waits for a session. Both are used on the thread that waits.
 struct PreparationWait {
   // May be empty. At each change of stage, and in between up to five times a second.
   std::function<void(const v1::PreparationProgress& progress)> on_progress;

@@ -10,7 +10,7 @@
 namespace tissueform {
 namespace {
 
-// CANCELLED: by whoever wants another stream in its place, as ReattachingWatch::Ack.
+// CANCELLED: the client cancels a stream to open another in its place, as ReattachingWatch::Ack.
 bool MayDoBetter(const absl::Status& status) {
   return IsTransient(status) || absl::IsCancelled(status);
 }

@@ -20,7 +20,7 @@
 namespace tissueform {
 namespace {
 
-// In place of gRPC's call credentials, which go over TLS only: over loopback there is none.
+// In place of gRPC's call credentials, which go over TLS only: loopback connections have no TLS.
 class TokenSender final : public grpc::experimental::Interceptor {
  public:
   explicit TokenSender(std::shared_ptr<TokenFile> token) : token_(std::move(token)) {}

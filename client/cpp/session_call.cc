@@ -24,7 +24,7 @@ bool NothingWasDone(const absl::Status& error) {
          HasReason(error, ErrorReason::kServerDraining);
 }
 
-// Nobody knows whether it was done.
+// It is unknown whether the server did it.
 bool IsLost(const absl::Status& error) {
   return absl::IsUnavailable(error) || absl::IsUnknown(error) || absl::IsInternal(error);
 }

@@ -43,7 +43,7 @@ inline constexpr std::chrono::milliseconds kNoPatience{0};
 //   UNAVAILABLE, UNKNOWN, INTERNAL              after a wait if kAlways          over
 //   any other                                   over                             over
 //
-// (CANCELLED by somebody else is UNAVAILABLE here: EndOfCall.)
+// (CANCELLED that another party caused is UNAVAILABLE here: EndOfCall.)
 //
 // Waits grow and differ by chance (Backoff); it is over when `patience` has passed since the first
 // error. One thread at a time.

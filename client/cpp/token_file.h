@@ -19,7 +19,7 @@ namespace tissueform {
 // The longest token that is read.
 inline constexpr int64_t kMaxTokenFileBytes = 16 << 10;
 
-// A file with a token, renewed by whoever logs in while the process runs. Thread-safe.
+// A file with a token, which a login may renew while the process runs. Thread-safe.
 class TokenFile {
  public:
   // Errors: NotFound, FailedPrecondition (others than its owner may read it), InvalidArgument (no

@@ -13,9 +13,9 @@
 
 namespace tissueform {
 
-// From which pages the gateway may be asked, and by which names. A page of somebody else that a
-// browser behind our network shows must not reach it: neither by its own name (Origin), nor by a
-// name of its own that turns to our address (Host; "DNS rebinding").
+// Which pages may call the gateway, and under which host names. A foreign page in a browser inside
+// our network must not reach it: neither under its own name (Origin), nor through a name of its own
+// that resolves to our address (Host; "DNS rebinding").
 class AccessRules {
  public:
   // `listen_host` as it is listened on: it and the names of loopback are allowed. `hosts`: names
@@ -23,14 +23,14 @@ class AccessRules {
   AccessRules(absl::string_view listen_host, const std::vector<std::string>& hosts,
               const std::vector<std::string>& origins);
 
-  // Exactly one Host, of those that are allowed, whatever its port.
+  // Exactly one Host, of those that are allowed, with any port.
   bool AllowsHost(const HttpHead& head) const;
 
   // No Origin (no browser asks, or for a page of ours), the one of the Host itself, or one of those
   // that are allowed. Never "null", never two.
   bool AllowsOrigin(const HttpHead& head) const;
 
-  // Whether this is an origin of another host that was allowed by name: it needs to be told so.
+  // Whether this is an origin of another host that was allowed by name: it needs CORS headers.
   bool IsForeignOrigin(absl::string_view origin) const;
 
  private:

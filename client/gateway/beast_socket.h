@@ -156,7 +156,7 @@ class BeastSocket final : public Socket,
     user_->OnBadMessage(why);
   }
 
-  // Once a second: whether somebody has waited for too long.
+  // Once a second: whether one of the waits has taken too long.
   void Watch() {
     watchdog_.expires_after(kWatchInterval);
     watchdog_.async_wait([weak = weak_from_this()](Error error) {
@@ -221,7 +221,7 @@ class BeastSocket final : public Socket,
   bool gone_ = false;
   Since silent_since_;
   Since sending_since_;
-  Since waiting_since_;  // nobody asks for a message
+  Since waiting_since_;  // no message is requested
   Since incomplete_since_;
   Since closing_since_;
 };

@@ -14,8 +14,8 @@
 #include "client/gateway/http_message.h"
 #include "client/gateway/upstream_call.h"
 
-// What of a call goes through the gateway beside its messages: few names, so that nobody smuggles
-// what a proxy before the server decides by.
+// The metadata of a call that the gateway passes on in addition to its messages: few names, so that
+// a client cannot smuggle in fields by which a proxy before the server decides.
 namespace tissueform {
 
 // Names that a client may send to the server: authorization, x-tissueform-session,
@@ -29,15 +29,15 @@ bool IsServedMethod(absl::string_view method);
 // 4 KiB: gRPC ends the process of who sends such.
 absl::Status CheckMetadata(const std::map<std::string, std::string>& metadata);
 
-// Those of a gRPC-Web request; the other fields that browsers send are none.
+// Those of a gRPC-Web request; the other fields that browsers send are left out.
 std::map<std::string, std::string> MetadataOf(const HttpHead& head);
 
 // Of `grpc-timeout`: "250m", at most eight digits and a unit of HMSmun.
 // Error: InvalidArgument.
 absl::StatusOr<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text);
 
-// Of the server's metadata what a client is told: x-tissueform-*, traceparent; text only, at most 4
-// KiB of it.
+// The part of the server's metadata that a client receives: x-tissueform-*, traceparent; text only,
+// at most 4 KiB of it.
 std::map<std::string, std::string> AllowedMetadata(
     const std::multimap<grpc::string_ref, grpc::string_ref>& metadata);
 

@@ -32,7 +32,7 @@ std::string ForwardedAddresses::Of(const HttpHead& head) const {
     if (name != "x-forwarded-for") continue;
     for (const absl::string_view part : absl::StrSplit(value, ',')) chain.push_back(part);
   }
-  // Each proxy adds at the end whom it was asked by.
+  // Each proxy appends the address that it received the request from.
   while (!chain.empty() && proxies_.contains(address)) {
     std::string before = AddressOr(absl::StripAsciiWhitespace(chain.back()));
     chain.pop_back();

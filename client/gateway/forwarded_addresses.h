@@ -13,8 +13,8 @@
 
 namespace tissueform {
 
-// From where requests come, behind proxies that say so in X-Forwarded-For. Anybody can write that
-// header: what counts is what a trusted proxy has put at its end.
+// Where requests come from, behind proxies that say so in X-Forwarded-For. Any client can write
+// that header: only the entries that a trusted proxy has appended count.
 class ForwardedAddresses {
  public:
   // `proxies`: addresses that pass CheckProxies.
@@ -23,8 +23,8 @@ class ForwardedAddresses {
   // Error: InvalidArgument when one is no address.
   static absl::Status CheckProxies(const std::vector<std::string>& proxies);
 
-  // The last address of the chain that is no trusted proxy, by the header as far as trusted proxies
-  // have written it, else the other end's. Empty when that is none.
+  // The last address of the chain that is not a trusted proxy, by the header as far as trusted
+  // proxies have written it, else the other end's. Empty if that is not an address.
   std::string Of(const HttpHead& head) const;
 
  private:

@@ -35,13 +35,13 @@ class Gateway {
   int port() const { return http_->port(); }
   // Calls `answered` on one of the threads that serve, later: proof that they do.
   void Ask(std::function<void()> answered) { http_->Post(std::move(answered)); }
-  // On which Prometheus finds the page of metrics; 0: there is none.
+  // The port on which Prometheus finds the page of metrics; 0: the page is not served.
   int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
   const GatewayCounters& counters() const { return counters_; }
   const UpstreamPool& pool() const { return pool_; }
 
-  // Ends in good order: nothing more is accepted, every call is told UNAVAILABLE, sockets get their
-  // end frame and close with 1001. Blocks until that is done, or its deadline. One thread, once.
+  // Shuts down gracefully: nothing more is accepted, every call receives UNAVAILABLE, sockets get
+  // their end frame and close with 1001. Blocks until done, or its deadline. One thread, once.
   void Drain() { http_->Drain(); }
 
  private:

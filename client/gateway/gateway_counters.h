@@ -53,7 +53,7 @@ class GatewayCounters {
  public:
   void Add(GatewayEvent event) { ++counts_[static_cast<size_t>(event)]; }
   int64_t Count(GatewayEvent event) const { return counts_[static_cast<size_t>(event)]; }
-  // Those that are not 0: "request=3 wrong_host=1"; nothing else is told of a request.
+  // Those that are not 0: "request=3 wrong_host=1"; it contains nothing else about a request.
   std::string Text() const;
 
  private:

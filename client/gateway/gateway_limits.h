@@ -8,8 +8,8 @@
 
 namespace tissueform {
 
-// What a browser, or whoever pretends to be one, may use of a gateway. docs/gateway.md has them
-// all.
+// What a browser, or a client that pretends to be one, may use of a gateway. docs/gateway.md lists
+// all limits.
 struct GatewayLimits {
   // Of a request's line and header fields.
   size_t header_bytes = size_t{16} << 10;

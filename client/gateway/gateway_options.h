@@ -21,7 +21,7 @@ struct GatewayOptions {
   // Encryption to the servers: authorities of their certificates, and the gateway's own.
   // Empty: none.
   TlsFiles upstream = {};
-  bool insecure = false;  // to servers on other machines without encryption all the same
+  bool insecure = false;  // allow unencrypted connections to servers on other machines
   // Proxies whose X-Forwarded-For counts.
   std::vector<std::string> trusted_proxies = {};
   std::string host = "127.0.0.1";

@@ -23,7 +23,7 @@ struct HttpHead {
   std::string peer = {};      // address of the other end, without a port
   bool wants_socket = false;  // asks for a WebSocket
 
-  // The first of this name; empty when there is none.
+  // The first field of this name; empty if it is missing.
   absl::string_view Field(absl::string_view name) const {
     for (const auto& [key, value] : fields) {
       if (key == name) return value;

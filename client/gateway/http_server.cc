@@ -67,7 +67,7 @@ class BeastServer final : public HttpServer {
     for (const auto& connection : context_.live.All()) connection->Drain();
     if (context_.live.WaitUntilNone(now + context_.limits.drain_deadline)) return;
     for (const auto& connection : context_.live.All()) connection->Abort();
-    // Calls that were cancelled end soon, whatever the server does.
+    // Canceled calls end soon, regardless of what the server does.
     if (!context_.live.WaitUntilNone(now + 3 * context_.limits.drain_deadline)) {
       spdlog::error("some connections do not end");
     }

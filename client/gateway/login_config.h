@@ -14,7 +14,7 @@ namespace tissueform {
 struct LoginConfig {
   std::string issuer = {};  // "https://login.example.org/realms/clinic"; empty: no login
   std::string client_id = {};
-  std::string audience = {};  // for whom tokens are asked for; empty: the provider's choice
+  std::string audience = {};  // requested audience of tokens; empty: the provider's choice
   std::string scopes = "openid profile";
 };
 
@@ -22,7 +22,7 @@ struct LoginConfig {
 // query or fragment; one of issuer and client id without the other.
 absl::Status CheckLoginConfig(const LoginConfig& config);
 
-// "https://login.example.org": of an issuer that has been checked. Empty where there is none.
+// "https://login.example.org": of an issuer that has been checked. Empty without an issuer.
 std::string OriginOfIssuer(const LoginConfig& config);
 
 // What /config.json answers: {} without a login, else an object `oidc`.

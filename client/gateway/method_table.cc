@@ -44,7 +44,7 @@ const MethodDescriptor* Find(absl::string_view method) {
   return nullptr;
 }
 
-// Of the message that ends at the stream's limit. False when it is none.
+// Of the message that ends at the stream's limit. False when the bytes are not such a message.
 bool FindLongest(CodedInputStream* stream, const Descriptor& type, int depth, BytesPlace* longest) {
   while (const uint32_t tag = stream->ReadTag()) {
     const FieldDescriptor* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));

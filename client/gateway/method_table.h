@@ -24,14 +24,14 @@ MethodKind KindOf(absl::string_view method);
 // What the method answers with; null when this gateway does not know it.
 const google::protobuf::Descriptor* AnswerOf(absl::string_view method);
 
-// Where bytes lie in a message.
+// The position of bytes in a message.
 struct BytesPlace {
   uint32_t offset = 0;  // from its first byte
-  uint32_t size = 0;    // 0: there are none
+  uint32_t size = 0;    // 0: the message has no bytes
 };
 
-// The longest `bytes` field of a serialised message of this type, and of the messages in it. What
-// is no such message has none.
+// The longest `bytes` field of a serialised message of this type, and of the messages in it. Bytes
+// that are not such a message have none.
 BytesPlace LongestBytes(absl::string_view message, const google::protobuf::Descriptor& type);
 
 }  // namespace tissueform

@@ -25,7 +25,7 @@ class SocketCall final : public SocketUser,
                          public UpstreamUser,
                          public std::enable_shared_from_this<SocketCall> {
  public:
-  // `client_address`: what the server is told. `pool` and `counters` outlive it.
+  // `client_address`: the address that the server receives. `pool` and `counters` outlive it.
   SocketCall(std::shared_ptr<Socket> socket, std::string client_address, UpstreamPool* pool,
              GatewayCounters* counters)
       : socket_(std::move(socket)),

@@ -39,7 +39,7 @@ struct SocketFrame {
 absl::StatusOr<SocketFrame> ParseClientFrame(absl::string_view frame);
 
 // What a start asks for, checked: a method that is served, metadata that may be sent.
-// Error: InvalidArgument; Unimplemented when the method is none of the servers'.
+// Error: InvalidArgument; Unimplemented when the servers do not have the method.
 absl::StatusOr<CallStart> ParseStart(absl::string_view payload);
 
 // A message of a server. Where `type` is given, its longest `bytes` field lies at a multiple of 4.

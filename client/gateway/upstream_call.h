@@ -51,7 +51,7 @@ class UpstreamUser {
   virtual void OnEnd(CallEnd end) = 0;
 };
 
-// One call of a server, of any kind, whose messages nobody looks into. All methods on the strand.
+// One call of a server, of any kind; its messages stay opaque. All methods on the strand.
 class UpstreamCall final : public std::enable_shared_from_this<UpstreamCall>,
                            private grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:

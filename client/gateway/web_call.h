@@ -24,7 +24,7 @@ class WebCall final : public ReplySource,
                       public UpstreamUser,
                       public std::enable_shared_from_this<WebCall> {
  public:
-  // `fields`: of every reply of the gateway. `client_address`: what the server is told.
+  // `fields`: of every reply of the gateway. `client_address`: the address for the server.
   WebCall(std::shared_ptr<ReplyStream> reply, HttpFields fields, std::string client_address)
       : reply_(std::move(reply)),
         fields_(std::move(fields)),

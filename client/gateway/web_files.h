@@ -29,8 +29,8 @@ class WebFiles {
   static absl::StatusOr<WebFiles> Load(const std::string& folder);
 
   // The reply to GET or HEAD for a path as it was requested: 200 with ETag, 304 where the client
-  // has it (`if_none_match`), 404. "/" is index.html. Files below /assets/ whose name holds a hash
-  // ("index-B7sKq2aZ.js") may be kept for ever, others are asked for again.
+  // has it (`if_none_match`), 404. "/" is index.html. Clients may cache files below /assets/ whose
+  // name holds a hash ("index-B7sKq2aZ.js") forever; they ask again for others.
   HttpReply Reply(absl::string_view path, absl::string_view if_none_match) const;
 
   size_t size() const { return files_.size(); }

@@ -57,7 +57,7 @@ void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
   if (!queued.note.empty()) absl::PrintF("  note        %s\n", queued.note);
 }
 
-// Until the server is told that it is stored. What has failed for good is told there, too.
+// Works until the server knows that it is stored. Permanent failures are reported to it, too.
 absl::Status StepToTheEnd(ExportWork* work, QueuedExport* queued) {
   for (int step = 0; step < kMaxSteps && queued->state != BridgeExportState::kTold; ++step) {
     const absl::Status status = work->Step(queued);
@@ -182,8 +182,8 @@ absl::Status BridgeCommands::Build() const {
   ReceivedRows rows(&parts->queue());
   TF_ASSIGN_OR_RETURN(QueuedSeries series, rows.Get(name_));
   const std::string recipe = options_->recipe.empty() ? series.recipe : options_->recipe;
-  // What was chosen goes on; all else begins anew, also a plan that lies there, since the recipe
-  // may say something else now.
+  // A chosen series goes on; all others begin again, also one with a finished plan, since the
+  // recipe may have changed.
   if (series.state != SeriesState::kChosen || series.recipe != recipe) {
     TF_RETURN_IF_ERROR(parts->intake().Choose(series, recipe, "chosen manually"));
     TF_ASSIGN_OR_RETURN(series, rows.Get(name_));

@@ -31,7 +31,7 @@ struct BridgeOptions {
   int64_t watermark_bytes = int64_t{2} << 30;
   TlsFiles tls = {};  // of the receiver, and of what the PACS is asked with; empty: plain
 
-  PacsPeer pacs = {};  // no host and no URL: there is none
+  PacsPeer pacs = {};  // no host and no URL: without a PACS
   bool has_pacs() const { return !pacs.host.empty() || !pacs.url.empty(); }
 
   std::string rules = {};   // file

@@ -23,7 +23,7 @@ namespace tissueform {
 // What the commands of a bridge work with, joined by its options in one place.
 class BridgeParts {
  public:
-  // Opens the queue, and what was received and a crash has kept from it. Asks nobody yet.
+  // Opens the queue, and recovers images that were received before a crash. Sends no requests yet.
   //
   // Errors: those of BridgeQueue::Open, InstanceFolder::Open, RulesOf (a file of rules; none is
   // needed for receiving), ConnectToCaseServer, MakePacsClient and OpenAuditSink.

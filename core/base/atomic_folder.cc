@@ -66,9 +66,9 @@ AtomicFolder::AtomicFolder(AtomicFolder&& other) noexcept
       hidden_(std::exchange(other.hidden_, {})),
       path_(std::move(other.path_)) {}
 
-// Two folders: mkdtemp lets nobody else into the outer one, and the inner one, which is published,
-// gets the permissions of any new folder. Setting them afterwards would mean to ask for the umask,
-// which cannot be read without changing it under the feet of other threads.
+// Two folders: mkdtemp creates the outer one so that only its owner may enter. The inner one, which
+// is published, gets the permissions of any new folder. Setting them afterwards would require the
+// umask, which cannot be read without changing it while other threads may rely on it.
 absl::StatusOr<AtomicFolder> AtomicFolder::Create(const std::string& folder) {
   TF_RETURN_IF_ERROR(CheckFillable(folder));
   const fs::path goal = Resolved(folder);

@@ -18,8 +18,9 @@ namespace tissueform {
 absl::Status CheckFillable(const std::string& folder);
 
 // A folder that appears at once, with all that it holds, or not at all. It is filled under another
-// name beside its goal, in a hidden folder that lets nobody else in (.NAME.partial-XXXXXX/NAME).
-// What is not published goes with this object; whoever writes into it must have ended by then.
+// name next to its destination, in a hidden folder that only its owner may enter
+// (.NAME.partial-XXXXXX/NAME). An unpublished folder is removed with this object; writers must have
+// ended by then.
 class AtomicFolder {
  public:
   // Errors: those of CheckFillable, or what the system says.
@@ -32,7 +33,7 @@ class AtomicFolder {
   const std::string& path() const { return path_; }
 
   // Gives it its name, once. Errors leave the content to the destructor: FailedPrecondition when
-  // somebody has filled the goal meanwhile, or what the system says.
+  // another writer has filled the destination since then, or the system's error.
   absl::Status Publish();
 
  private:

@@ -10,8 +10,8 @@
 
 namespace tissueform {
 
-// Whether somebody still waits for the result of long work: passed down to it, asked between its
-// stages. Cheap to copy; what it asks must outlive the work and be safe on the thread that works.
+// Whether a caller still waits for the result of long work: passed down to the work, which asks it
+// between stages. Cheap to copy; its function must outlive the work and be safe on its thread.
 class Cancellation {
  public:
   // Never.

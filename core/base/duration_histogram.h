@@ -11,8 +11,8 @@
 
 namespace tissueform {
 
-// How long something took, counted in buckets, for whoever watches the program. Thread-safe,
-// without a lock; Observe takes some nanoseconds.
+// How long operations took, counted in buckets, for monitoring. Thread-safe, without a lock;
+// Observe takes some nanoseconds.
 class DurationHistogram {
  public:
   // Upper bounds of the buckets in seconds, each inclusive; what is longer is in one more.

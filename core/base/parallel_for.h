@@ -11,8 +11,8 @@ namespace tissueform {
 
 // Calls body(begin, end) for consecutive ranges that cover [0, size), on up to `threads` threads,
 // and returns when all are done. Ranges begin at multiples of `grain`, so work done in blocks of
-// `grain` is the same whatever the number of threads. With one thread, or not more than one grain,
-// it runs on the caller's.
+// `grain` is the same for any number of threads. With one thread, or not more than one grain, it
+// runs on the caller's thread.
 //
 // The body must not throw and must write only what belongs to its range.
 // REQUIRES: threads >= 1, grain >= 1.

@@ -23,9 +23,9 @@ struct PreparationProgress {
   int64_t steps = 0;  // of so many; 0: the stage does not count
 };
 
-// How far long work is: passed down to it, called when a stage begins and after each step of one
-// that counts, on the thread that works. May be empty. It must not take long; what it tells must
-// outlive the work. (Whether anybody still waits is asked of a Cancellation.)
+// Progress of long work: passed down to the work, which calls it on its own thread when a stage
+// begins and after each step of a stage that counts steps. May be empty. It must not take long;
+// what it refers to must outlive the work. (A Cancellation says whether a caller still waits.)
 using PreparationObserver = std::function<void(const PreparationProgress& progress)>;
 
 inline void TellProgress(const PreparationObserver& observer, PreparationStage stage,

@@ -7,8 +7,8 @@
 
 namespace tissueform {
 
-// 128 random bits in 32 hexadecimal digits: who does not know an id does not guess it, and none
-// comes again, on whatever machine it is made.
+// 128 random bits in 32 hexadecimal digits: an id cannot be guessed, and ids do not repeat, even
+// across machines.
 std::string RandomId();
 
 }  // namespace tissueform

@@ -8,7 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-// Debian's Abseil 20220623 has no status macros; these are the two that everybody knows.
+// Debian's Abseil 20220623 has no status macros; these are the two that are in common use.
 
 // Returns from the function when `expression` (an absl::Status) is not OK.
 #define TF_RETURN_IF_ERROR(expression)                              \

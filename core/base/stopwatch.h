@@ -14,7 +14,7 @@ class Stopwatch {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
 
-  // Seconds(), and begins anew.
+  // Seconds(), and starts again from zero.
   double Restart() {
     const double seconds = Seconds();
     start_ = std::chrono::steady_clock::now();

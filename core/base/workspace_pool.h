@@ -11,8 +11,8 @@
 
 namespace tissueform {
 
-// Workspaces for work that several threads do at once on what is constant: each borrows one, which
-// nobody else has meanwhile. There come to be as many as were ever in use at the same time.
+// Workspaces for work that several threads do at once on constant data: each borrows one for
+// exclusive use. The pool holds as many as were ever in use at the same time.
 //
 // Thread-safe.
 template <typename Workspace>

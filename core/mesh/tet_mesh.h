@@ -28,7 +28,7 @@ class TetMesh {
   Eigen::Index num_vertices() const { return positions().rows(); }
   Eigen::Index num_tets() const { return tets().rows(); }
 
-  // Keeps the arrays alive for whoever looks at them beyond the life of this mesh.
+  // Keeps the arrays alive for readers that use them beyond the life of this mesh.
   std::shared_ptr<const void> storage() const { return arrays_; }
 
   // Length of the diagonal of the axis-aligned bounding box, in mm: "the size" of the mesh.

@@ -27,7 +27,7 @@ class TriangleMesh {
   Eigen::Index num_vertices() const { return positions().rows(); }
   Eigen::Index num_triangles() const { return triangles().rows(); }
 
-  // Keeps the arrays alive for whoever looks at them beyond the life of this mesh.
+  // Keeps the arrays alive for readers that use them beyond the life of this mesh.
   std::shared_ptr<const void> storage() const { return arrays_; }
 
  private:

@@ -21,7 +21,7 @@ namespace {
 // precision.
 constexpr double kDegenerateVolumeRatio = 1e-12;
 
-// True when there are none.
+// True when all vertices are finite.
 bool FindNonFiniteVertices(const TetMesh& mesh, MeshReport* report) {
   std::vector<Eigen::Index> found;
   for (Eigen::Index v = 0; v < mesh.num_vertices(); ++v) {

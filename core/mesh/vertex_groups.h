@@ -9,7 +9,7 @@
 
 namespace tissueform {
 
-// For every vertex the lowest one at exactly the same place, itself where there is none. #V.
+// For every vertex the lowest one at exactly the same place, which may be the vertex itself. #V.
 //
 // REQUIRES: positions are finite.
 std::vector<int32_t> FirstVertexAtSamePlace(const Positions& positions);

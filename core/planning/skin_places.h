@@ -15,7 +15,7 @@
 
 namespace tissueform {
 
-// Vertices that are told of together.
+// Vertices that reports treat as one place.
 struct SkinPlace {
   std::string name;
   std::vector<int32_t> vertices;  // at least one, rising
@@ -32,7 +32,7 @@ absl::StatusOr<std::vector<SkinPlace>> SkinPlaces(const std::vector<Attribute>& 
 // first. REQUIRES: there is one.
 int32_t ForemostVertex(const Positions& positions, const std::vector<int32_t>& vertices);
 
-// Null when there is none of that name.
+// Null when no place has that name.
 const SkinPlace* FindPlace(const std::vector<SkinPlace>& places, absl::string_view name);
 
 }  // namespace tissueform

@@ -127,7 +127,7 @@ class Cluster:
         workers = ["--workers", str(self._count(self.cpus_of(node)))] if self.cpus_of(node) else []
         return [self.programs / "tissueform-server", "--port", str(self.port(node)), "--node-name", node, "--store", database.address(database_port),
                 "--store-password-file", self.state["database"]["password_file"], "--memory-budget-mib", str(self._memory_mib()),
-                # All come from one address, HAProxy's, and nobody logs in: all are one principal.
+                # All clients come from one address, HAProxy's, without a login: all are one principal.
                 "--max-connections-per-address", "1024", "--quota-streams", "2048", "--quota-calls-per-second", "20000",
                 *workers, *settings["server_options"]]
 

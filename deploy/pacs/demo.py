@@ -132,7 +132,7 @@ def main():
     missing = stack.missing_programs()
     if missing:
         sys.exit(f"missing: {', '.join(missing)}; deploy/install_packages.sh test installs them")
-    # Whoever ends this ends what it has started: also by SIGTERM, and where a shell has it pass over Ctrl-C.
+    # However this program ends, it ends what it has started: also by SIGTERM, and where a shell makes it ignore Ctrl-C.
     signal.signal(signal.SIGTERM, end_once)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     folder = pathlib.Path(words.folder or tempfile.mkdtemp(prefix="tissueform-pacs-"))

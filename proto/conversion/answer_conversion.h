@@ -9,7 +9,7 @@
 #include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/session.pb.h"
 
-// What is told of an answer and of a preparation, beside the positions; every field both ways.
+// Conversions of what an answer and a preparation report besides positions; all fields both ways.
 namespace tissueform {
 
 v1::SolveSummary ToProto(const SolveSummary& summary);

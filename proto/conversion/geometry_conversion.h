@@ -83,7 +83,7 @@ EncodedPositions EncodePositions(const FloatPositions& chosen, const VertexChoic
 absl::StatusOr<Positions> DecodePositions(const std::string& bytes, int64_t num_vertices);
 
 // In any encoding; `rest` are the positions of the same vertices in the mesh. Errors: also
-// DataLoss (damaged bytes, a step that is none), InvalidArgument (an unknown encoding).
+// DataLoss (damaged bytes, an invalid step), InvalidArgument (an unknown encoding).
 absl::StatusOr<Positions> DecodePositions(const std::string& bytes, v1::PositionEncoding encoding,
                                           double step_mm, const Positions& rest);
 

@@ -16,8 +16,8 @@ namespace tissueform {
 // Names of tissues stay behind.
 v1::MaterialRanges ToProto(const MaterialUncertainty& uncertainty);
 
-// For a mesh of so many tets and its Poisson's ratio. Errors: InvalidArgument (not one tissue a
-// tet, a tissue or a range that is none).
+// For a mesh with `num_tets` tets and its Poisson's ratio. Errors: InvalidArgument (not one tissue
+// for each tet, an unknown tissue, an invalid range).
 absl::StatusOr<MaterialUncertainty> ToMaterialUncertainty(const v1::MaterialRanges& proto,
                                                           Eigen::Index num_tets,
                                                           double poisson_ratio);

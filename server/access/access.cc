@@ -215,7 +215,7 @@ absl::StatusOr<bool> Access::IsExportedCase(const CaseKey& key) {
   TF_ASSIGN_OR_RETURN(const std::set<std::string> planners,
                       queries_.OwnersOfPredictions(predictions));
   for (const std::string& planner : planners) {
-    // Whoever names a case that is not open to them opens it to no bridge.
+    // A planner who may not read the case cannot open it to bridges by naming it in a prediction.
     if (planner == key.owner) return true;
     TF_ASSIGN_OR_RETURN(const std::vector<CaseGrant> cases,
                         queries_.FindCases(key.sha256, planner));

@@ -30,17 +30,17 @@ enum class Permission {
   kOwner,  // change it, delete it, share it
 };
 
-// Who may do what: the one place that decides it (docs/security.md, "Permissions").
+// Decides which principal may do what, in this one place (docs/security.md, "Permissions").
 //
-// Every check asks the store once. What a principal may not look at answers NotFound, as what is
-// not there, to the letter; PermissionDenied is for what may be looked at only. What nobody with a
-// name owns is open to those without a name, and to them alone.
+// Every check asks the store once. A resource that a principal may not read gives NotFound, exactly
+// as a missing one does; PermissionDenied is only for readable resources. A resource without an
+// owner is open to anonymous callers, and to them alone.
 //
 // While a database that servers share does not answer, what was allowed to a principal for a
 // session in the last kRememberedWhenAway before stays allowed: this server may still hold the
 // session by a lease, which ends by itself.
 //
-// Checks block, those of sessions and links at most 2 s. Errors of all, beside those named:
+// Checks block, those of sessions and links at most 2 s. Errors of all, in addition to those named:
 // Unavailable (the database does not answer). Thread-safe.
 class Access {
  public:
@@ -62,8 +62,8 @@ class Access {
   // PermissionDenied.
   static absl::Status CheckProjectAccess(const Principal& caller, const std::string& project);
 
-  // Whether there is a resource of this name. To those without a name, names of nothing are
-  // allowed: whoever uses the resource then says that it is not there.
+  // Whether there is a resource of this name. Anonymous callers may use names that do not exist:
+  // the code that uses the resource then reports that it is missing.
   enum class Found { kYes, kNo };
 
   // Errors: NotFound, PermissionDenied; Unauthenticated for a follow link that has ended.
@@ -140,7 +140,7 @@ class Access {
   absl::StatusOr<std::optional<Level>> SessionLevel(const Principal& caller, const std::string& id);
   absl::StatusOr<std::optional<Level>> PredictionLevel(const Principal& caller,
                                                        const std::string& id);
-  // Whether a bridge may look at the case for a prediction of somebody who may.
+  // Whether a planner who may read the case has made an exported prediction of it.
   absl::StatusOr<bool> IsExportedCase(const CaseKey& key);
   absl::StatusOr<CaseKey> FindCase(const Principal& caller, const std::string& sha256,
                                    Permission need);

@@ -40,7 +40,7 @@ class AccessChanges {
   absl::StatusOr<std::vector<ShareRow>> SharesOf(const Principal& caller,
                                                  const std::string& resource);
 
-  // Keeps a follow link of the caller's making. Errors: those of Access::CheckSessionAccess
+  // Keeps a follow link that the caller has created. Errors: those of Access::CheckSessionAccess
   // (kWrite) and CheckCaseAccess; ResourceExhausted.
   absl::Status AddLink(const Principal& caller, FollowLinkRow link);
   // All of the session. Errors: those of Access::CheckSessionAccess (kWrite).

@@ -34,8 +34,8 @@ struct ServerOptions {
   int max_connections = 1024;
   int max_connections_per_address = 512;
   std::chrono::seconds drain_deadline{20};
-  // Nothing outlives the process. A server in a test; the program keeps what it acknowledges unless
-  // it is told otherwise.
+  // Nothing outlives the process. True for a server in a test; the program keeps what it
+  // acknowledges unless it runs with --in-memory.
   bool in_memory = true;
   std::string data_dir;  // empty: DefaultDataFolder
   ClusterOptions cluster = {};

@@ -42,7 +42,7 @@ constexpr int kHandshakeMilliseconds = 10'000;
 // For what was finished just now to leave the buffers.
 constexpr std::chrono::milliseconds kLastMessagesGrace{500};
 
-// Proxies ask for the health every second; who is sent here meanwhile is served as ever.
+// Proxies check the health every second; calls that they still send here until then are served.
 constexpr std::chrono::seconds kUntilProxiesSee{3};
 
 void PrepareProcessOnce() {
@@ -358,7 +358,7 @@ void TissueformServer::Drain() {
   const auto deadline = std::chrono::steady_clock::now() + options_.drain_deadline;
   spdlog::info("draining: {} open streams, at most {} s", streams_.size(),
                options_.drain_deadline.count());
-  // Whoever waits for a database that is away is told so while there is time to hear it.
+  // Calls that wait for an unreachable database fail while clients still receive the reason.
   if (cluster_ != nullptr) cluster_->BeginDraining(deadline - options_.drain_deadline / 10);
   server_->GetHealthCheckService()->SetServingStatus(false);
   if (cluster_ != nullptr) {

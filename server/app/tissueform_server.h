@@ -72,16 +72,16 @@ class TissueformServer {
   // The port that is listened on, also when the options said 0.
   int port() const { return listener_->port(); }
 
-  // On which Prometheus finds the page of metrics; 0: there is none.
+  // The port on which Prometheus finds the page of metrics; 0: the page is not served.
   int metrics_port() const { return metrics_.has_value() ? metrics_->port() : 0; }
 
-  // Ends in good order: health turns to NOT_SERVING, streams are told (with the time of the drain
-  // deadline), new work is refused with
-  // UNAVAILABLE; open calls may go on until the drain deadline and are then cancelled; the listener
-  // closes. Blocks until all calls have ended. One thread, once.
+  // Ends in good order: health turns to NOT_SERVING, streams receive a notice (with the time of the
+  // drain deadline), new work is refused with UNAVAILABLE; open calls may go on until the drain
+  // deadline and are then cancelled; the listener closes. Blocks until all calls have ended. One
+  // thread, once.
   //
-  // A node of a cluster serves on for some seconds, in which proxies see its health; then it gives
-  // its sessions to the others, and their streams end with SESSION_MOVED.
+  // A node of a cluster continues to serve for some seconds, in which proxies see its health; then
+  // it hands its sessions to the others, and their streams end with SESSION_MOVED.
   void Drain();
 
   // Calls `answered` later, when the lanes that planners wait for have each done a job.
@@ -97,7 +97,7 @@ class TissueformServer {
   const RotatedFiles* tls_files() const { return tls_files_.get(); }
   // Strangers may reach it, and it is not protected from them: --insecure.
   bool is_exposed() const;
-  // Null: nobody logs in.
+  // Null: there are no logins.
   const TokenAuthenticator* tokens() const { return tokens_.get(); }
   // Null without --store.
   Cluster* cluster() { return cluster_.get(); }
@@ -108,7 +108,7 @@ class TissueformServer {
     std::unique_ptr<Telemetry> telemetry;
     std::unique_ptr<RotatedFiles> tls_files;     // null without TLS
     std::unique_ptr<TokenAuthenticator> tokens;  // null: none are configured
-    Authenticator* authenticator = nullptr;      // null: nobody logs in
+    Authenticator* authenticator = nullptr;      // null: there are no logins
     OpenedStores opened;
     std::unique_ptr<Cluster> cluster;   // null without --store
     std::unique_ptr<BuildRoom> builds;  // null where no plans are built
@@ -118,9 +118,9 @@ class TissueformServer {
 
   absl::Status LoadIndex();
   absl::Status Listen();
-  // What sessions may still take, where those that nobody uses leave for it.
+  // Memory that sessions may still take, with the memory of unused sessions that can be evicted.
   int64_t FreeBytes() const;
-  // Nothing is told without --metrics-port.
+  // Does nothing without --metrics-port.
   absl::Status ServeMetrics();
   SecurityReadings ReadSecurity() const;
 
@@ -140,7 +140,7 @@ class TissueformServer {
   AccessQueries access_queries_;  // of the rows of the stores
   Access access_;
   AccessChanges access_changes_;
-  std::unique_ptr<LinkAuthenticator> authenticator_;  // null: nobody logs in
+  std::unique_ptr<LinkAuthenticator> authenticator_;  // null: there are no logins
   std::unique_ptr<Cluster> cluster_;                  // null without --store
   AdmissionControl gate_;
   MemoryBudget budget_;

@@ -103,7 +103,7 @@ struct BuildFiles::File {
   Mutex mutex;
   BuildFileRecord record ABSL_GUARDED_BY(mutex);
   bool is_checked ABSL_GUARDED_BY(mutex) = false;  // the digest of the whole is right
-  bool is_dropped ABSL_GUARDED_BY(mutex) = false;  // whoever still has it looks
+  bool is_dropped ABSL_GUARDED_BY(mutex) = false;  // checked by threads that still hold the file
 };
 
 BuildFiles::BuildFiles(std::string folder, const PlanBuildLimits& limits, UnixClock clock)
@@ -120,7 +120,7 @@ absl::StatusOr<std::unique_ptr<BuildFiles>> BuildFiles::Open(std::string folder,
   return files;
 }
 
-// What cannot be taken up is removed: its client begins anew.
+// A file that cannot be taken up is removed: its client starts the upload again.
 absl::Status BuildFiles::TakeUp() {
   std::set<std::string> taken;
   std::vector<fs::path> found;

@@ -40,17 +40,17 @@ struct BuildFileRecord {
 absl::Status CheckWhole(const BuildFileRecord& file);
 
 // InvalidArgument unless it ends the name of a volume, surface, transform, markups or zip that
-// tissueform-plan-build reads. DICOM is none: its files name the patient.
+// tissueform-plan-build reads. DICOM is not accepted: its files name the patient.
 absl::Status CheckBuildFileSuffix(absl::string_view suffix);
 
-// Files that plans are built from, each named by its SHA-256 and its owner, so that nobody goes on
-// with what another has sent, or hears of it. A file that has not arrived in full stays, and its
-// upload goes on after a restart. Nothing here looks into a file.
+// Files that plans are built from, each named by its SHA-256 and its owner, so that a user can
+// neither continue nor detect another user's upload. A file that has not arrived in full stays, and
+// its upload goes on after a restart. The contents of a file are never read here.
 //
 // Calls block on the disk. Thread-safe.
 class BuildFiles {
  public:
-  // Takes up what lies in the folder; it is made where there is none.
+  // Takes up the files in the folder; creates the folder if it does not exist.
   static absl::StatusOr<std::unique_ptr<BuildFiles>> Open(std::string folder,
                                                           const PlanBuildLimits& limits,
                                                           UnixClock clock = SystemUnixSeconds);
@@ -59,7 +59,7 @@ class BuildFiles {
   BuildFiles& operator=(const BuildFiles&) = delete;
 
   // Begins an upload, or goes on with one that was announced in the same way; returns the file as
-  // it is. One that was announced otherwise is begun anew.
+  // it is. An upload that was announced differently starts again from 0.
   //
   // Errors: InvalidArgument (CheckBuildFileSuffix, no SHA-256, a size that is not positive),
   // ResourceExhausted (a limit, a full disk), or what the disk says.
@@ -79,8 +79,8 @@ class BuildFiles {
   // Errors: NotFound.
   absl::StatusOr<BuildFileRecord> Find(const std::string& owner, const std::string& sha256);
   absl::Status Remove(const std::string& owner, const std::string& sha256);
-  // Unless it was announced again since `seen` was found: somebody is told that it is here, and is
-  // about to build from it.
+  // Unless it was announced again since `seen` was found: another client then knows that the file
+  // is here, and is about to build from it.
   void RemoveIfUnasked(const BuildFileRecord& seen);
 
   // A second name of a whole file, "GOAL" in a folder of the same disk, which stays when the file

@@ -144,7 +144,7 @@ absl::Status PlanBuilds::TakeUp() {
   MutexLock lock(mutex_);
   for (const fs::path& path : found) {
     auto record = ReadRecord(path.string() + kRecord);
-    // Without a record it was not yet kept, and no client has been told of it.
+    // A build without a record was not yet kept, and no client knows of it.
     if (!record.ok()) {
       if (fs::exists(path.string() + kRecord, error)) {
         spdlog::warn("a plan build with an unreadable record is removed: {}",

@@ -56,7 +56,7 @@ class PlanBuilds {
   absl::StatusOr<v1::PlanBuild> Create(const std::string& owner,
                                        const v1::CreatePlanBuildRequest& request);
 
-  // Errors of all: NotFound, also where it is another's.
+  // Errors of all: NotFound, also where the build belongs to another user.
   absl::StatusOr<v1::PlanBuild> Find(const std::string& owner, const std::string& id) const;
   // One that waits has ended when it returns; one that runs ends soon, or is done first.
   absl::StatusOr<v1::PlanBuild> Cancel(const std::string& owner, const std::string& id);

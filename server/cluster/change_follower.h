@@ -23,7 +23,7 @@
 
 namespace tissueform {
 
-// What this server knows of a store that it shares, and who is told when others change it.
+// The parts of this server that hold data of the shared store and must follow others' changes.
 struct ClusterListeners {
   Stores* stores = nullptr;  // those of the database themselves
   SessionRegistry* sessions = nullptr;
@@ -31,19 +31,19 @@ struct ClusterListeners {
   ExportQueue* exports = nullptr;
 };
 
-// Follows what others change in the store: reads what a notice names and tells the rooms, on a
-// thread of its own. A notice says where to look, and what is there now counts: so it may come late
-// and twice, or be of what this server has done itself. Whoever may have missed some reads all.
+// Follows what others change in the store: reads what a notice names and notifies the listeners, on
+// a thread of its own. A notice says where to look, and the store's present state counts: so it may
+// come late or twice, or be of this server's own change. After a possible gap, all is read again.
 class ChangeFollower {
  public:
-  // Listens when it returns; nobody is told before Begin. Errors: those of ChangeListener::Start.
+  // Listens when it returns; no listener is called before Begin. Errors: ChangeListener::Start's.
   static absl::StatusOr<std::unique_ptr<ChangeFollower>> Start(const PostgresOptions& options);
-  // Nobody is told any longer.
+  // No listener is called after it.
   ~ChangeFollower();
   ChangeFollower(const ChangeFollower&) = delete;
   ChangeFollower& operator=(const ChangeFollower&) = delete;
 
-  // `rooms`, which must outlive it, have learnt what there is: what has changed since Start is told
+  // `rooms`, which must outlive it, have read the store: they receive what has changed since Start
   // first. Once.
   void Begin(const ClusterListeners& rooms);
 

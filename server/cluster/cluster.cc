@@ -31,7 +31,7 @@ absl::StatusOr<std::unique_ptr<Cluster>> Cluster::Open(const ClusterOptions& opt
   const PostgresOptions database = NodeOptionsOf(stores->pool()->options());
   TF_ASSIGN_OR_RETURN(std::unique_ptr<PostgresPool> pool, PostgresPool::Open(database));
   std::unique_ptr<Cluster> cluster(new Cluster(options, name, stores, std::move(pool)));
-  // Where nothing can be written a start is told, not the first call.
+  // A database that cannot be written makes the start fail, not the first call.
   TF_RETURN_IF_ERROR(cluster->node_.nodes().Exchange());
   TF_ASSIGN_OR_RETURN(cluster->follower_, ChangeFollower::Start(database));
   spdlog::info("node {} of a cluster", name);

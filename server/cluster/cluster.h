@@ -39,15 +39,15 @@ class Cluster {
   const std::string& name() const { return node_.name(); }
   const ExportLookups& lookups() const { return lookups_; }
 
-  // Whatever the rooms do not know they look for from now on. All must outlive Stop.
+  // From now on the listeners look up what they do not know. All must outlive Stop.
   void Join(ClusterListeners rooms);
   // `free_bytes` says how much memory sessions may still take here; any thread.
   void Start(std::function<int64_t()> free_bytes);
-  // No room is told of anything any more; leases are renewed no longer.
+  // Listeners are no longer notified, and leases are no longer renewed.
   void Stop();
 
-  // Others place nothing here any more, and nobody waits for the database beyond `deadline`. Blocks
-  // on the store.
+  // Others no longer place sessions here, and no call waits for the database beyond `deadline`.
+  // Blocks on the store.
   void BeginDraining(PostgresPool::Clock::time_point deadline);
 
   // Must outlive the page.

@@ -31,21 +31,21 @@ class ClusterNode final : public SessionOwnership {
   // `pool` must outlive it.
   ClusterNode(PostgresPool* pool, const ClusterOptions& options, std::string name);
 
-  // Told of each session that this server held and holds no longer, without a lock held. Before
-  // Start.
+  // `on_lost` is called with each session that this server held and holds no longer, without a lock
+  // held. Before Start.
   void set_on_lost(std::function<void(const std::string& id)> on_lost) {
     on_lost_ = std::move(on_lost);
   }
-  // Leases are renewed, and others told of this server, from now on. `free_bytes` says how much
+  // From now on leases are renewed, and other servers see this one. `free_bytes` says how much
   // memory sessions may still take here. Once.
   void Start(std::function<int64_t()> free_bytes);
-  // Neither is done any longer, and nobody is told of anything.
+  // Ends both; `on_lost` is no longer called.
   void Stop();
 
   const std::string& name() const { return name_; }
   NodeTable& nodes() { return nodes_; }
   const CountedLeases& leases() const { return counted_; }
-  // Sessions that were held and are not any longer, without having been given away.
+  // Sessions that were held and no longer are, without having been given away.
   int64_t lost() const { return lost_; }
   int held() { return keeper_.CountHeld(); }
 

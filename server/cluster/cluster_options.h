@@ -47,9 +47,9 @@ std::string DefaultNodeName(int port);
 // Of the pool that answers calls. Errors: those of ReadPostgresPassword.
 absl::StatusOr<PostgresOptions> StoreOptionsOf(const ClusterOptions& options);
 
-// Of the pool that leases, the table of nodes and looks at single rows have for themselves:
-// whatever calls wait for, a lease is renewed, and what is not answered is given up while there is
-// still time for another try.
+// Of the pool that leases, the table of nodes and lookups of single rows have for themselves: a
+// lease is renewed even while calls wait, and a request without an answer is given up while there
+// is still time for another try.
 PostgresOptions NodeOptionsOf(PostgresOptions store);
 
 }  // namespace tissueform

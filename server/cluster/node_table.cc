@@ -88,7 +88,7 @@ absl::Status NodeTable::Exchange() {
   const absl::Status status = pool_->Run(
       [&](PostgresTransaction& transaction) -> absl::Status {
         others.clear();
-        // A row that is lost with the database's power is written anew a second later.
+        // If the database loses power this row may be lost; it is written again a second later.
         TF_RETURN_IF_ERROR(transaction.Execute("SET LOCAL synchronous_commit = off"));
         TF_RETURN_IF_ERROR(transaction.Run(
             "INSERT INTO nodes (holder, name, free_bytes, draining, seen) VALUES ($1, $2, $3, "
@@ -143,7 +143,7 @@ void NodeTable::NoteAnswer(bool answered) {
 void NodeTable::Loop() {
   bool was_taken = false;
   for (;;) {
-    // What fails is tried again in a second; meanwhile nobody is thought to have room.
+    // A failed exchange is repeated after kSoon; until then no server counts as having room.
     const bool answered = Exchange().ok();
     NoteAnswer(answered);
     const bool taken = IsNameTaken();

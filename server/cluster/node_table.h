@@ -18,9 +18,9 @@
 
 namespace tissueform {
 
-// Which servers use the store now, and who of them has room: the table `nodes`, in which each has a
-// row that it writes anew every second. One that has not written for 10 s counts as gone. Nothing
-// but hints comes from it: who holds a session the leases decide.
+// Which servers use the store now, and which of them have room: the table `nodes`, in which each
+// rewrites its row every second. One that has not written for 10 s counts as gone. The table gives
+// only hints: leases decide which server holds a session.
 //
 // Thread-safe.
 class NodeTable {
@@ -37,8 +37,8 @@ class NodeTable {
   NodeTable(const NodeTable&) = delete;
   NodeTable& operator=(const NodeTable&) = delete;
 
-  // Whom to tell from now on, under a lock, whether calls should come here: false when the database
-  // has not answered for kCutOffAfter, true when it does again; nothing once this server drains.
+  // `tell` is called under a lock when calls should go elsewhere or here: with false when the
+  // database has not answered for kCutOffAfter, with true when it does again; not once this drains.
   void TellReach(std::function<void(bool)> tell) ABSL_LOCKS_EXCLUDED(mutex_);
   // A thread writes and reads from now on, and asks for the free bytes. Once.
   void Start(std::function<int64_t()> free_bytes);

@@ -298,7 +298,7 @@ absl::Status ExportQueue::Erase(const std::vector<std::string>& ids) {
 }
 
 void ExportQueue::Drop(const std::vector<std::string>& ids) {
-  // From memory at once: what is taken back opens nothing any more, whatever the disk says.
+  // From memory at once: a withdrawn export grants no access, regardless of what the disk says.
   MutexLock lock(mutex_);
   for (const std::string& id : ids) {
     const auto found = records_.find(id);

@@ -29,17 +29,17 @@ struct ExportLimits {
   int max_watches = 256;              // WatchExports calls open at the same time
 };
 
-// The exports of a server: all in memory, each change in the store first. Looking never blocks;
+// The exports of a server: all in memory, each change in the store first. Reading never blocks;
 // changing blocks on the disk, so not on the commit thread.
 //
-// Thread-safe. Those who are told are told without a lock that looking takes, one at a time.
+// Thread-safe. `on_changed` is called without a lock that reading takes, one call at a time.
 class ExportQueue {
  public:
   // All must outlive it.
   ExportQueue(const ExportLimits& limits, ExportStore* store, UnixClock clock = SystemUnixSeconds)
       : limits_(limits), store_(*store), clock_(std::move(clock)) {}
 
-  // Before anything else. It is told of every export that is new or changed.
+  // Before anything else. `on_changed` is called with every export that is new or changed.
   void set_on_changed(std::function<void(const ExportRecord&)> on_changed) {
     on_changed_ = std::move(on_changed);
   }
@@ -139,9 +139,9 @@ class ExportQueue {
   ExportStore& store_;
   const UnixClock clock_;
   std::function<void(const ExportRecord&)> on_changed_ = [](const ExportRecord&) {};
-  ReadGate read_gate_;  // empty: nobody else writes
+  ReadGate read_gate_;  // empty: no other server writes
 
-  // Held over the store and over those who are told: changes come one after the other.
+  // Held over the store and over `on_changed`: changes come one after the other.
   Mutex writing_;
 
   // After writing_, and over nothing else.

@@ -43,7 +43,7 @@ struct ExportRecord {
 };
 
 std::string SerializeExport(const ExportRecord& record);
-// Errors: DataLoss, for bytes that are none.
+// Errors: DataLoss, for bytes that are not a record.
 absl::StatusOr<ExportRecord> ParseExport(absl::string_view bytes);
 
 // Whether an export may come from one state into another: into the same one, forward from one that
@@ -51,7 +51,7 @@ absl::StatusOr<ExportRecord> ParseExport(absl::string_view bytes);
 // the person has seen.
 bool MayFollow(ExportState before, ExportState after);
 
-// Aborted (STALE_ETAG): somebody else has changed it.
+// Aborted (STALE_ETAG): another caller has changed it.
 absl::Status StaleExport(absl::string_view id);
 absl::Status NoExport(absl::string_view id);  // NotFound
 

@@ -29,7 +29,7 @@ class ExportStore {
   // what the disk says.
   virtual absl::Status Put(const ExportRecord& record) = 0;
 
-  // All or none; one that is not there is none. Errors: what the disk says.
+  // All or nothing; missing ids are ignored. Errors: what the disk says.
   virtual absl::Status Erase(const std::vector<std::string>& ids) = 0;
 };
 

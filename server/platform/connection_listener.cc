@@ -42,7 +42,7 @@ absl::Status CannotListen(const ConnectionListener::Options& options, const std:
                                              ": ", why, "; choose another ", options.chosen_by));
 }
 
-// The port that the socket has; 0 when there is none.
+// The port that the socket has; 0 without one.
 int PortOf(int fd) {
   sockaddr_storage address{};
   socklen_t size = sizeof(address);
@@ -134,7 +134,7 @@ absl::Status ConnectionListener::Bind(const Options& options) {
     }
     error = errno;
     close(fd);
-    if (error == EADDRINUSE) break;  // half of a name's addresses would be a riddle
+    if (error == EADDRINUSE) break;  // listening on some of a name's addresses would confuse users
   }
   if (listener_fds_.empty() || error == EADDRINUSE) {
     return CannotListen(options, std::strerror(error));
@@ -181,7 +181,7 @@ bool ConnectionListener::AcceptOne(int listener_fd) {
   const int fd = accept4(listener_fd, reinterpret_cast<sockaddr*>(&address), &size,
                          SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (fd < 0) {
-    // Said even when nobody waits.
+    // accept4 reports these even when no connection waits.
     if (errno == EMFILE || errno == ENFILE) return TurnOneAway(listener_fd);
     // Gone before it was accepted, or a signal: there may be more. No memory: later.
     if (errno == ENOBUFS || errno == ENOMEM) poll(nullptr, 0, kPauseMilliseconds);
@@ -208,7 +208,7 @@ bool ConnectionListener::TurnOneAway(int listener_fd) {
     ++refused_;
   }
   spare_fd_ = OpenSpare();
-  // Somebody else was quicker: wait until one is free, else this would spin.
+  // Another thread has taken the descriptor: wait until one is free, otherwise this would spin.
   if (spare_fd_ < 0) poll(nullptr, 0, kPauseMilliseconds);
   return fd >= 0;
 }

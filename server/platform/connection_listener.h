@@ -19,8 +19,8 @@ namespace tissueform {
 int RaiseDescriptorLimit();
 
 // Accepts connections and hands them on, no more than may be open at a time. gRPC 1.51's own
-// listener stops for good when the process runs out of descriptors (CVE-2023-4785, not mended in
-// Debian): this one keeps a spare descriptor, turns away what is too much, and goes on.
+// listener stops for good when the process runs out of descriptors (CVE-2023-4785, not fixed in
+// Debian): this one keeps a spare descriptor, turns away surplus connections, and goes on.
 //
 // Thread-safe.
 class ConnectionListener {
@@ -59,8 +59,8 @@ class ConnectionListener {
   void AcceptUntilStopped();
   // False when nothing waits.
   bool AcceptOne(int listener_fd);
-  // Out of descriptors: gives the spare one up for a moment, so that who waits is turned away
-  // instead of waiting for ever. False: nobody waits.
+  // Out of descriptors: frees the spare one for a moment, so that a waiting connection is turned
+  // away instead of waiting forever. False: no connection waits.
   bool TurnOneAway(int listener_fd);
   void TellOfRefusals();
 

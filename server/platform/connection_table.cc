@@ -27,7 +27,7 @@ ConnectionTable::Verdict ConnectionTable::Take(int fd, const std::string& addres
            : CountOf(address) >= most_of_address_ ? Verdict::kTooManyOfAddress
                                                   : Verdict::kTaken;
   };
-  // The descriptor is free, so whatever had it is closed.
+  // The number is in use again, so the connection that had it is closed.
   if (connections_.contains(fd) || full() != Verdict::kTaken) ForgetClosed();
   if (const Verdict verdict = full(); verdict != Verdict::kTaken) return verdict;
   connections_[fd] = {*inode, address};

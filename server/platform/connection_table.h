@@ -9,8 +9,8 @@
 
 namespace tissueform {
 
-// Which connections are open, though somebody else closes them: a descriptor that is closed, or is
-// another file by now, is no connection any more. One thread at a time.
+// Which connections are open, though other code closes them: a descriptor that is closed, or is
+// another file by now, is no longer a connection. One thread at a time.
 class ConnectionTable {
  public:
   // Connections at the same time, and of one address.

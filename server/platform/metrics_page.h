@@ -14,19 +14,19 @@
 
 namespace tissueform {
 
-// The page of metrics that a Prometheus server reads from a program. Everything on it is asked for
-// when it is read: whoever counts keeps plain numbers and knows nothing of the page.
+// The page of metrics that a Prometheus server reads from a program. Each value is read when the
+// page is requested: code that counts keeps plain numbers and knows nothing of the page.
 //
 // Names are families: several of one name have different values of the same labels. No label's
 // value comes from a client.
 class MetricsPage {
  public:
   using Labels = std::map<std::string, std::string>;
-  // Called by threads of the page, several at a time, until the page ends. Waits for nobody. NaN:
-  // there is nothing to tell, and the line is left out.
+  // Called by threads of the page, several at a time, until the page ends. Must not block. NaN:
+  // there is no value, and the line is left out.
   using Read = std::function<double()>;
 
-  // The page holds nothing yet, and nobody serves it.
+  // The page is empty and not yet served.
   MetricsPage();
   // Waits for readers that are under way.
   ~MetricsPage();

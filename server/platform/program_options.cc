@@ -38,8 +38,8 @@ bool IsNo(const std::string& value) {
   return lower == "false" || lower == "off" || lower == "no" || lower == "0";
 }
 
-// `told` where the name could be somebody's mistake; a file that was meant for something else, a
-// token or a key, is not told again.
+// `told` where the name may be a typing mistake; the text of a file that was meant for something
+// else, a token or a key, is not repeated.
 std::string WrongName(const std::string& name, const std::string& told) {
   constexpr size_t kLongestName = 40;
   const bool may_be_a_name =

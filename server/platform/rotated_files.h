@@ -38,14 +38,14 @@ class PrivateFile {
 };
 
 // Certificates, key and authorities that are renewed by rewriting their files while the process
-// runs. gRPC's own watcher takes whatever stands in a file and answers no handshake while that is
-// nonsense: so what it watches are copies in memory, and only what was checked gets there.
+// runs. gRPC's own watcher takes any content of a file and answers no handshake while that is
+// invalid: so it watches copies in memory, which only receive checked contents.
 //
 // Thread-safe.
 class RotatedFiles {
  public:
   // Reads and checks all of them, and looks every second whether they have changed until it is
-  // destroyed. What is no good then is told in the log, counted, and not used.
+  // destroyed. A new content that is invalid is logged, counted, and not used.
   //
   // Errors: those of ReadTlsFiles and CheckTlsContents. REQUIRES: at least one file is named.
   static absl::StatusOr<std::unique_ptr<RotatedFiles>> Load(const TlsFiles& paths);

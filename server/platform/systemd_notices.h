@@ -12,8 +12,8 @@
 
 namespace tissueform {
 
-// What systemd is told by a service of Type=notify (sd_notify(3)). Nothing happens in a program
-// that systemd has not started so.
+// Messages that a service of Type=notify sends to systemd (sd_notify(3)). They have no effect in a
+// program that systemd has not started in this way.
 
 void TellSystemdReady();
 void TellSystemdStopping();
@@ -22,8 +22,8 @@ void TellSystemdStopping();
 // the program itself says so: systemd ends a program that is silent, and starts it again.
 class SystemdWatchdog {
  public:
-  // Asks the program: `answered` is to be called once, by whatever thread, when it does its work.
-  // It may be called, or thrown away, later than the watchdog ends.
+  // Asks the program: `answered` is to be called once, by any thread, when the program does its
+  // work. It may be called, or thrown away, after the watchdog has ended.
   using Ask = std::function<void(std::function<void()> answered)>;
 
   // Asks four times in the time that systemd waits, one question at a time, on a thread of its own.
@@ -41,7 +41,7 @@ class SystemdWatchdog {
   ConditionVariable stopped_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
 
-  std::thread thread_;  // none where nobody waits
+  std::thread thread_;  // not started if the unit has no watchdog
 };
 
 }  // namespace tissueform

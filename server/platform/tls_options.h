@@ -10,16 +10,16 @@
 
 namespace tissueform {
 
-// How a server is reached: encrypted, and by whom.
+// How a server is reached: its encryption, and the clients that it accepts.
 struct TlsOptions {
   std::string certificate = {};  // chain in PEM; empty: no TLS
   std::string key = {};
   std::string client_ca = {};  // authorities of clients' certificates; empty: none is asked for
-  // Who has no certificate of these authorities is turned away; otherwise only who has a bad one.
+  // Turns away clients without a certificate of these authorities; false: only a bad certificate.
   bool client_certificate_required = true;
-  // The name in the gateway's certificate: it alone may say whom it speaks for.
+  // The name in the gateway's certificate: only the gateway may state its client's address.
   std::string gateway_name = {};
-  bool insecure = false;  // off loopback without TLS or without logins all the same
+  bool insecure = false;  // allows addresses off loopback without TLS or without logins
 
   bool enabled() const { return !certificate.empty(); }
 };

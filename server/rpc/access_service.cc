@@ -77,7 +77,7 @@ absl::StatusOr<FollowLinkRow> ToLink(const v1::CreateFollowLinkRequest& request,
   return link;
 }
 
-// Whose usage the caller asks for; empty: everybody's.
+// The principal whose usage the caller asks for; kEverybody: all of them.
 absl::StatusOr<std::string> AskedPrincipal(const Principal& caller, const std::string& asked) {
   if (asked.empty() || asked == caller.name) return caller.name;
   if (!caller.anonymous() && !caller.roles.contains("admin")) {

@@ -16,7 +16,7 @@ absl::StatusOr<std::string> AllowedSession(Access* access, CallScope* scope,
   TF_ASSIGN_OR_RETURN(std::string id, ParseSessionName(name));
   TF_ASSIGN_OR_RETURN(const Access::Found found,
                       access->CheckSessionAccess(scope->principal(), id, need));
-  // What nobody has made is a text of the client's, and goes to no log.
+  // The name of a resource that does not exist is only the client's text, and goes to no log.
   if (found == Access::Found::kYes) scope->SetResource(name);
   return id;
 }

@@ -145,7 +145,7 @@ void DeformStreamReactor::OnDone() {
   authorization_.Stop();
   DeadlineTimer::Id rest;
   {
-    MutexLock lock(mutex_);  // whoever called Finish may still hold it
+    MutexLock lock(mutex_);  // the thread that called Finish may still hold it
     rest = rest_.wait();
   }
   timer_->Cancel(rest);

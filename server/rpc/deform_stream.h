@@ -37,12 +37,12 @@ namespace tissueform {
 // (FrameScheduler) and how (stream_drag), commits (StreamCommits), the number of followers
 // (StreamFollowers), whether the caller may go on (StreamAuthorization).
 //
-// One read, one write and one job are under way at a time: on the session's making strand before
+// One read, one write and one job are under way at a time: on the session's making_strand() before
 // the stream begins, then those of stream_drag. A session that has left memory is opened again, and
 // the stream goes on with that. Deletes itself when gRPC is done with it.
 //
 // Reactions come on gRPC's threads and compute nothing. Finish is called once, when no job or write
-// is under way, since whatever runs may use this object, and no commit, unless the session has
+// is under way, since each of them may use this object, and no commit, unless the session has
 // moved to another server. Jobs hold the configuration themselves; nothing that the mutex guards
 // leaves it by pointer. The registry is never called under the mutex, since it may answer before it
 // returns: jobs in the lane of frames call it.
@@ -87,7 +87,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void EndUnlessHeld() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Ends the stream with `outcome`; only the first one counts.
   void End(const absl::Status& outcome) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Starts whatever may start now: the next write, the next solve, the end.
+  // Starts everything that may start now: the next write, the next solve, the end.
   void Advance() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void StartNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void WriteNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -101,7 +101,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   absl::Status Configure(std::shared_ptr<Session> session) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // The stream may begin, or go on.
   void Begin(StreamBegin begin) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // On the session's making strand.
+  // On the session's making_strand().
   void Prepare(const StreamConfiguration& configuration) ABSL_LOCKS_EXCLUDED(mutex_);
 
   void FinishCommit(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex_);

@@ -100,7 +100,7 @@ ExportWatch::ExportWatch(CallScope scope, CancelCall cancel, std::chrono::millis
 
 void ExportWatch::OnSendInitialMetadataDone(bool ok) {
   const absl::Status joined = ok ? watches_->Add(this) : absl::CancelledError("the client is gone");
-  // After it has joined: what changes from then on is told, and what was before is in the book.
+  // After it has joined: later changes are sent as they come, and the book has the earlier ones.
   std::set<std::string> waiting = book_.Waiting(owner_);
   MutexLock lock(mutex_);
   opening_ = false;
@@ -130,7 +130,7 @@ void ExportWatch::OnDone() {
   watches_->Remove(this);
   DeadlineTimer::Id tick;
   {
-    MutexLock lock(mutex_);  // whoever called Finish may still hold it
+    MutexLock lock(mutex_);  // the thread that called Finish may still hold it
     tick = tick_;
   }
   timer_->Cancel(tick);
@@ -187,7 +187,7 @@ bool ExportWatch::NextMessage() {
   while (!changed_.empty()) {
     const absl::StatusOr<ExportRecord> record = book_.Find(*changed_.begin());
     changed_.erase(changed_.begin());
-    if (!record.ok()) continue;  // taken back meanwhile
+    if (!record.ok()) continue;  // withdrawn since then
     *message_.mutable_export_() = ToProto(*record);
     return true;
   }

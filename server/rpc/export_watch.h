@@ -57,9 +57,9 @@ class ExportWatches {
   bool draining_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
-// Sends each export that its caller may see once it is new or changed, as it is at last, with one
-// write in flight. Deletes itself when gRPC is done with it. Watches and book are never called
-// with the mutex, but for looking.
+// Sends each export that its caller may see once it is new or changed, in its latest state, with
+// one write in flight. Deletes itself when gRPC is done with it. With the mutex held, watches and
+// book are never called except to read.
 class ExportWatch : public grpc::ServerWriteReactor<v1::WatchExportsResponse>,
                     public ExportWatcher {
  public:

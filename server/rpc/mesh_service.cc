@@ -164,7 +164,7 @@ absl::Status MeshService::List(const Principal& caller, const v1::ListMeshesRequ
   return absl::OkStatus();
 }
 
-// Others who have sent the same bytes keep the mesh, and nobody hears of them.
+// Other users who have sent the same bytes keep the mesh, and the caller does not learn of them.
 absl::Status MeshService::RemoveMesh(CallScope* scope, const v1::DeleteMeshRequest& request) {
   Access& access = changes_->access();
   TF_ASSIGN_OR_RETURN(const std::string sha256,

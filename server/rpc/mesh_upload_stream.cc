@@ -52,7 +52,7 @@ absl::StatusOr<MeshUploadStream::After> MeshUploadStream::TakeHeader(
   const auto known = catalog_->Look(sha256_);
   // A store that was waited for in vain is not waited for once more, nor after the bytes.
   if (absl::IsUnavailable(known.status())) return known.status();
-  // Whoever may not use the mesh does not hear that it is here: the bytes say who has it.
+  // A caller without access does not learn that the mesh is here: only its bytes prove possession.
   const bool may_use = changes_->access().CheckMeshAccess(caller, sha256_, Permission::kRead).ok();
   if (may_use && known.ok()) {
     *response_->mutable_mesh() = ToProto(*known);

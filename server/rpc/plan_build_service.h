@@ -19,8 +19,8 @@
 namespace tissueform {
 
 // tissueform.v1.PlanBuildService over a store of files, drafts and a queue. Files and builds belong
-// to who sent them, and to no one else; drafts also belong to those with whom their
-// project is shared. All pointers must outlive it.
+// to the user who sent them, and to no other user; a draft in a shared project is also open to the
+// users of that share. All pointers must outlive it.
 class PlanBuildService final : public v1::PlanBuildService::CallbackService {
  public:
   // `room` null: the server builds no plans. `keeps_drafts`: whether those who share a draft call

@@ -17,7 +17,7 @@
 
 namespace tissueform {
 
-// A prediction as it is kept, and as it is told.
+// A prediction as it is stored, and as it is sent to clients.
 
 // What makes the creation idempotent.
 struct PredictionRequestKey {

@@ -261,7 +261,7 @@ absl::Status PredictionService::List(const v1::ListPredictionsRequest& request,
       break;
     }
     absl::StatusOr<KeptPrediction> kept = FromRecord(record);
-    if (!kept.ok()) continue;  // whoever asks for it hears so
+    if (!kept.ok()) continue;  // a call that asks for this prediction reports the error
     *response->add_predictions() = std::move(kept->prediction);
   }
   return absl::OkStatus();

@@ -71,7 +71,7 @@ void PrepareSessionStream::OnWriteDone(bool ok) {
 
 void PrepareSessionStream::OnDone() {
   {
-    MutexLock lock(mutex_);  // whoever called Finish may still hold it
+    MutexLock lock(mutex_);  // the thread that called Finish may still hold it
   }
   preparation_->EndOfCall();
   delete this;

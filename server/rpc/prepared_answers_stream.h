@@ -14,9 +14,9 @@
 
 namespace tissueform {
 
-// Answers a GetPreparedAnswers call: prepares what it asks for on the session's making strand, or
-// finds it made, and sends it. Pointers and references must outlive the call, the request until it
-// ends.
+// Answers a GetPreparedAnswers call: prepares what it asks for on the session's making_strand(), or
+// finds it prepared, and sends it. Pointers and references must outlive the call, the request until
+// it ends.
 grpc::ServerWriteReactor<v1::GetPreparedAnswersResponse>* StartPreparedAnswers(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,
     const ServiceLimits& limits, Access* access, SessionRegistry* registry,

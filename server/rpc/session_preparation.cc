@@ -212,7 +212,7 @@ void SessionPreparation::Finish(absl::StatusOr<v1::Session> result,
   {
     MutexLock lock(mutex_);
     std::swap(done, done_);
-    // Where nobody is told its name it is not kept.
+    // A session whose name the client does not receive is not kept.
     if (done && result.ok()) claimed_ = std::exchange(claimed, nullptr);
   }
   if (claimed != nullptr) registry_->sync().Abandon(claimed);

@@ -36,8 +36,8 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   // Gets the name of the session that the call may use.
   using OnAllowed = std::function<void(const std::string& resource)>;
 
-  // `tell` (may be empty) and `on_allowed` are not called any more once `done` is. All may take
-  // locks of their own, under which nobody calls this object. The pointers must outlive it.
+  // `tell` (may be empty) and `on_allowed` are no longer called once `done` is. All may take locks
+  // of their own, but must not call this object under them. The pointers must outlive it.
   SessionPreparation(const ServiceLimits& limits, Access* access, MeshCatalog* catalog,
                      SessionRegistry* registry, v1::PrepareSessionRequest request, TellSession tell,
                      OnAllowed on_allowed, Done done);
@@ -52,7 +52,7 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   void Cancel();
 
   // The call is over. A client that has cancelled never learns the name of the session that was
-  // made for it, and nobody would ever delete it: so it ends.
+  // made for it, so no client would ever delete it: it ends here.
   void EndOfCall();
 
  private:
@@ -78,7 +78,7 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
                    const std::shared_ptr<Session>& claimed);
   // Once more from the store, which knows the etag and the times.
   void Describe(const std::shared_ptr<Session>& session, const std::shared_ptr<Session>& claimed);
-  // The first one counts. A session that was made for somebody who has left is given back.
+  // The first one counts. A session that was made for a client that has left is given back.
   void Finish(absl::StatusOr<v1::Session> result, std::shared_ptr<Session> claimed = nullptr)
       ABSL_LOCKS_EXCLUDED(mutex_);
 

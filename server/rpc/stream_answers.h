@@ -58,7 +58,7 @@ struct StreamBegin {
 };
 
 StreamBegin BeginWithoutPreparation(const StreamConfiguration& configuration);
-// On the session's making strand. Errors: those of Session::PrepareModel and PrepareResponse.
+// On the session's making_strand(). Errors: those of Session::PrepareModel and PrepareResponse.
 absl::StatusOr<StreamBegin> PrepareAnswers(const StreamConfiguration& configuration,
                                            const Cancellation& cancellation);
 
@@ -77,7 +77,7 @@ absl::StatusOr<AnswerFrame> SolvePose(const StreamConfiguration& configuration,
 
 v1::DeformResponse ToProto(AnswerFrame frame);
 
-// What those who watch the stream are told of its frames.
+// What watchers of the stream learn about the form of its frames.
 v1::WatchForm FormOf(const StreamConfiguration& configuration, const v1::DeformStarted& started);
 
 }  // namespace tissueform

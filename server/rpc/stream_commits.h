@@ -40,7 +40,7 @@ class StreamCommits {
   void StartNext(const std::shared_ptr<Session>& session);
   // One is on its way.
   bool under_way() const { return under_way_; }
-  // The store has answered the one on its way. Returns what the client is told.
+  // The store has answered the commit that is on its way. Returns the notice for the client.
   v1::DeformNotice Finish(uint64_t sequence, const absl::Status& outcome);
 
   // Once it has returned, `answered` neither runs nor will. Not with the owner's lock held. A

@@ -51,8 +51,8 @@ class DragRest {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  // After so long without a newer pose an estimate is worked out. Longer than poses of a drag are
-  // apart; shorter would take a processor from other drags for answers that nobody waits for.
+  // After this time without a newer pose an estimate is worked out. Longer than poses of a drag are
+  // apart; a shorter time would take a processor from other drags for answers that are not needed.
   static constexpr std::chrono::milliseconds kRest{150};
 
   // `look` is called on the timer's thread when the rest may be over; it calls EndWait. `timer`

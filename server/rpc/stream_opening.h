@@ -33,10 +33,10 @@ class StreamOpening {
   // Jobs hold it while they run. Null before the first session.
   const Configuration& configuration() const { return configuration_; }
 
-  // The session has left memory and is to be opened again. Returns what the client is told; empty:
-  // nothing, since an update is announced once the session is there again. REQUIRES: a session.
+  // The session has left memory and is to be opened again. Returns the notice for the client;
+  // empty: none, since an update is announced once the session is there again. REQUIRES: a session.
   std::optional<v1::DeformNotice> Leave();
-  // The stream begins, or goes on. Returns what the client is told; empty: nothing.
+  // The stream begins, or goes on. Returns the notice for the client; empty: none.
   std::optional<v1::DeformNotice> Resume();
 
  private:

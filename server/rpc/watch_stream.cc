@@ -190,7 +190,7 @@ void WatchStreamReactor::OnDone() {
   watches_->Remove(id_);
   authorization_.Stop();
   {
-    MutexLock lock(mutex_);  // whoever called Finish may still hold it
+    MutexLock lock(mutex_);  // the thread that called Finish may still hold it
   }
   delete this;
 }

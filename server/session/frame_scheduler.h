@@ -28,7 +28,7 @@ struct WaitingPose {
   std::chrono::steady_clock::time_point arrived = {};
 };
 
-// What the drags of a server have done, for whoever watches it. Thread-safe.
+// What the drags of a server have done, for monitoring. Thread-safe.
 struct FrameMeasures {
   std::atomic<int64_t> poses = 0;
   std::atomic<int64_t> coalesced_poses = 0;  // replaced by a newer one before they were answered
@@ -81,8 +81,8 @@ class FrameScheduler {
   std::optional<WaitingPose> TakePose() { return StartOn(std::exchange(mailbox_, std::nullopt)); }
   // A pose that was taken and could not be answered, to be answered later unless a newer one waits.
   void PutBack(WaitingPose pose);
-  // The answer, or nothing when there is none. One whose solve was given up (summary.cancelled) is
-  // kept only when it is the first to its pose: better than none.
+  // The answer, or nothing if the solve has no answer. One whose solve was given up
+  // (summary.cancelled) is kept only when it is the first to its pose: better than nothing.
   void FinishSolve(std::optional<AnswerFrame> frame);
   // An answer that is `refining`, and what it answers, to be worked out when no newer pose comes.
   void FinishEstimate(AnswerFrame frame, WaitingPose pose);

@@ -121,7 +121,7 @@ bool Housekeeping::WriteUse() {
   const int64_t unix_s = NowS();
   const int64_t offset_s = unix_s - started_s_ -
                            std::chrono::duration_cast<std::chrono::seconds>(now - started_).count();
-  // A clock that was behind has been put right: what was used meanwhile has a time that is too
+  // A clock that was behind has been put right: what was used before that has a time that is too
   // early.
   const bool set_forward = offset_s > offset_s_ + kSetForwardSeconds;
   const Clock::TimePoint since = set_forward ? started_ : written_until_;

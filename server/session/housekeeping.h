@@ -20,12 +20,12 @@
 
 namespace tissueform {
 
-// What is done for the store from time to time, on a thread of its own: writes down what was used,
-// deletes what nobody has used for too long, and uploads that were broken off.
+// Regular work on the store, on a thread of its own: writes down what was used, deletes what was
+// not used for too long, and uploads that were broken off.
 //
-// Unused means: a session that nobody opened and no stream holds; a mesh of no session and no
-// prediction; a prediction that was made so long ago and whose session is gone; a case that nobody
-// has sent or read, of no prediction; an export that has not changed. What was used while
+// Unused means: a session that no client opened and no stream holds; a mesh of no session and no
+// prediction; a prediction that was made so long ago and whose session is gone; a case that no
+// client has sent or read, of no prediction; an export that has not changed. What was used while
 // the server ran is known by a clock that never goes back. The machine's clock only decides about
 // the rest, and only as far as it went on with that one: set back or forward while the server runs,
 // it deletes nothing early. Of a store that several servers share the database's clock decides, not
@@ -66,7 +66,7 @@ class Housekeeping {
   void Stop();
 
   // One round. Blocks on the disk; what fails is logged and left to the next round. At most
-  // kMaxOfARound of each kind go at once, so that nobody's commit waits long behind them.
+  // kMaxOfARound of each kind go at once, so that a client's commit never waits long behind them.
   Removed RunOnce();
   // Only the first part of a round. False when it failed.
   bool WriteUse();
@@ -98,7 +98,7 @@ class Housekeeping {
   SessionRegistry* const registry_;
   MeshCatalog* const catalog_;
 
-  // Of whoever runs a round.
+  // Used by the thread that runs a round.
   Clock::TimePoint started_;
   int64_t started_s_ = 0;
   int64_t started_machine_s_ = 0;

@@ -22,7 +22,7 @@ struct ServiceLimits {
   int max_watches = 256;
   int max_watches_per_session = 16;
   std::chrono::seconds session_idle_ttl{1800};
-  int retention_days = 30;  // what nobody used for so long is deleted; 0: nothing is
+  int retention_days = 30;  // what was not used for so long is deleted; 0: nothing is
   // A client that says nothing for so long is given up.
   std::chrono::milliseconds configuration_deadline{10'000};  // of a stream, from its opening on
   std::chrono::milliseconds upload_silence{30'000};          // between two chunks

@@ -21,7 +21,7 @@ namespace tissueform {
 
 class MemoryBudget;
 
-// Bytes promised to somebody before they are allocated; given back when it is destroyed. The budget
+// Bytes that are reserved before they are allocated; given back when it is destroyed. The budget
 // must outlive it. One thread at a time.
 class MemoryReservation {
  public:

@@ -184,8 +184,8 @@ absl::Status MeshCatalog::Remove(const std::string& sha256) {
     MutexLock lock(mutex_);
     while (removing_.contains(sha256)) moved_.Wait(mutex_);
     removing_.insert(sha256);
-    // Whoever has read it, or has put it into the store, would else give it to the others after it
-    // was removed.
+    // A thread that has read it, or has put it into the store, would otherwise give it to later
+    // callers after it was removed.
     while (arriving_.contains(sha256)) moved_.Wait(mutex_);
   }
   return FinishRemoval(sha256);
@@ -220,7 +220,7 @@ int MeshCatalog::RemoveIdle(Clock::Duration idle) {
     MutexLock lock(mutex_);
     const Clock::TimePoint cutoff = clock_->Now() - idle;
     for (auto entry = meshes_.begin(); entry != meshes_.end();) {
-      // New users come through this map alone: with one reference nobody can gain another now.
+      // New users come through this map only: a mesh with one reference cannot gain another now.
       if (entry->second.mesh.use_count() == 1 && entry->second.last_used <= cutoff) {
         removed.push_back(std::move(entry->second.mesh));
         entry = meshes_.erase(entry);

@@ -109,8 +109,8 @@ class MeshCatalog {
   // The names of those in memory.
   std::vector<std::string> HeldNames() const;
 
-  // Takes those meshes out of memory that nobody uses and nobody has asked for within `idle`.
-  // Returns how many.
+  // Takes the meshes out of memory that are not in use and that no caller has asked for within
+  // `idle`. Returns how many.
   int RemoveIdle(Clock::Duration idle);
 
   // In memory, and the bytes that they have reserved.
@@ -120,7 +120,7 @@ class MeshCatalog {
   };
   Held CountHeld() const;
 
-  // Those in memory that somebody holds, or has asked for after `since`.
+  // Those in memory that are in use, or that a caller has asked for after `since`.
   std::vector<std::string> UsedSince(Clock::TimePoint since);
   // Takes a mesh out of memory and store unless it is one of these, or is on its way here. The
   // caller knows that no session is made from it. Blocks on the disk. False when it stays.

@@ -27,8 +27,8 @@ struct UploadProgress {
 
 class MeshUploads;
 
-// One client's sending of a mesh. Nobody else writes its part meanwhile. One thread at a time; all
-// calls, and its end, block on the disk.
+// One client's upload of a mesh. No other upload writes its part at the same time. One thread at a
+// time; all calls, and its end, block on the disk.
 class MeshUpload {
  public:
   // What has come is synced, so that it is there for the next attempt; a part without a byte goes.
@@ -36,7 +36,7 @@ class MeshUpload {
   MeshUpload(const MeshUpload&) = delete;
   MeshUpload& operator=(const MeshUpload&) = delete;
 
-  // Takes one chunk. The first one goes on where the part ends, or begins anew at 0; the others
+  // Takes one chunk. The first one goes on where the part ends, or starts again at 0; the others
   // follow without gaps. `last`: the mesh is complete.
   //
   // Errors: InvalidArgument (too large, out of place, past the end; the last before all bytes are

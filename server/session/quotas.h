@@ -11,9 +11,9 @@
 
 namespace tissueform {
 
-// What one principal may take of the server; nobody's where nobody logs in, since then all callers
-// are one. What is over a quota is refused with ResourceExhausted, QUOTA_EXCEEDED and the time
-// after which it is worth trying again. A drag's surplus poses are no calls: they are coalesced.
+// What one principal may take of the server; not applied without logins, since then all callers are
+// one. What is over a quota is refused with ResourceExhausted, QUOTA_EXCEEDED and the time
+// after which it is worth trying again. A drag's surplus poses are not calls: they are coalesced.
 struct Quotas {
   int calls_per_second = 200;  // on average; twice as many at once
   int waiting_calls = 64;      // that are answered or wait for it, streams apart

@@ -81,8 +81,8 @@ class Session {
 
   const std::string& id() const { return id_; }
 
-  // By which this server holds it; null where its store is its own. Set once, before anybody but
-  // its maker has it.
+  // The lease by which this server holds it; null where its store is its own. Set once, before any
+  // code but its creator has it.
   void SetHold(SessionLeaseHandlePtr hold) { hold_ = std::move(hold); }
   const SessionLeaseHandlePtr& hold() const { return hold_; }
   // Under which it is written.
@@ -118,7 +118,7 @@ class Session {
   bool HasModel(DeformationModel model) const;
   Lane LaneOf(DeformationModel model) const;
 
-  // On the making strand. Makes another model than the session's own ready. What exists is shared
+  // On making_strand(). Prepares another model than the session's own. What exists is shared
   // and not factorised again.
   //
   // Errors: those of SharedPreparation::MakeModel and PrepareResponse, NotFound (the session was
@@ -148,12 +148,12 @@ class Session {
   enum class CloseReason { kDeleted, kEvicted, kUpdated, kMoved };
 
   // Any thread; on the strand where the memory is to be free afterwards even if something is being
-  // solved. Gives the memory back; later calls of Deform fail. What is being made for the session
-  // at this moment (see making()) is given back when that ends.
+  // solved. Gives the memory back; later calls of Deform fail. A preparation for the session that
+  // is under way at this moment gives its memory back when it ends.
   void Close(CloseReason reason);
   // Any thread. Closed, but the server still has the session: SessionLoader::Open gives another.
   bool evicted() const { return evicted_; }
-  // Any thread. Closed, since this server does not hold it any longer.
+  // Any thread. Closed, since this server no longer holds it.
   bool moved() const { return moved_; }
   // Any thread. That other one is made from something else; and its handles are others, so that
   // poses for this one say nothing to it. Stay so.
@@ -166,7 +166,7 @@ class Session {
   // Any thread. Whether a call of PrepareModel or PrepareResponse is under way.
   bool making() const { return making_; }
 
-  // Any thread. When somebody last did something with the session.
+  // Any thread. Records that a client has used the session now.
   void Touch() { last_used_ = clock_->Now(); }
   Clock::TimePoint last_used() const { return last_used_; }
 

@@ -22,7 +22,7 @@ absl::Status MovedIfFenced(absl::Status status);
 absl::Status SessionOutdated();        // Aborted: its handles are others now
 absl::Status MeshInUse(int sessions);  // FailedPrecondition
 absl::Status NoSuchMesh();             // NotFound
-absl::Status NoMeshAnyMore();          // NotFound: it was deleted meanwhile
+absl::Status NoMeshAnyMore();          // NotFound: it has been deleted since
 // ResourceExhausted: what the server does with so many ("keeps"), and what helps.
 absl::Status TooManySessions(int limit, absl::string_view what, absl::string_view remedy);
 

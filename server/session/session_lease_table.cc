@@ -45,7 +45,7 @@ absl::StatusOr<SessionLeaseHandlePtr> SessionLeaseTable::TakeAndWait(const std::
     state->is_taken = true;
   }
   auto hold = std::make_shared<const SessionLeaseHandle>(shared_from_this(), state, id, *epoch);
-  // Whoever hands all over may not have seen it.
+  // A hand-over of all sessions may not have seen it.
   if (stops_taking_) state->given_up = true;
   return hold;
 }

@@ -41,7 +41,7 @@ class SessionOwnership {
   // NotFound, those of the store.
   virtual absl::StatusOr<int64_t> Acquire(const std::string& id) = 0;
 
-  // The epoch to write under; none when this server may not answer (any longer). Fast, never
+  // The epoch to write under; empty when this server may not answer the session. Fast, never
   // blocks.
   virtual std::optional<int64_t> EpochOf(const std::string& id) = 0;
 
@@ -54,8 +54,8 @@ class SessionOwnership {
 
 class SessionLeaseTable;
 
-// Somebody's part in it that this server holds a session of a store that it shares: whoever makes,
-// drags, watches or changes one has such an object. With the last one of a session its lease is
+// A share in a session's lease, where servers share a store: code that makes, drags, watches or
+// changes a session has such an object. With the last one of a session its lease is
 // given back. Thread-safe.
 class SessionLeaseHandle {
  public:
@@ -115,9 +115,9 @@ class SessionLeaseTable : public std::enable_shared_from_this<SessionLeaseTable>
 
   bool shared() const { return ownership_ != nullptr; }
 
-  // Takes a session whose record is kept, where nobody else holds it: at once where the store is
-  // not shared, else in Lane::kLeases. Errors: those of SessionOwnership::Acquire; Unavailable (the
-  // server ends, or has begun to hand over).
+  // Takes a session whose record is kept, unless another server holds it: at once where the store
+  // is not shared, else in Lane::kLeases. Errors: those of SessionOwnership::Acquire; Unavailable
+  // (the server ends, or has begun to hand over).
   void Take(const std::string& id, const TakenCallback& done);
   // The same; blocks.
   absl::StatusOr<SessionLeaseHandlePtr> TakeAndWait(const std::string& id);
@@ -138,10 +138,10 @@ class SessionLeaseTable : public std::enable_shared_from_this<SessionLeaseTable>
   void GiveUp(const std::string& id);
   // Its record is gone; never blocks. REQUIRES: shared, as Release.
   void Forget(const std::string& id) { ownership_->Forget(id); }
-  // Gives it back, whoever holds it; blocks.
+  // Gives it back, regardless of its handles; blocks.
   void Release(const std::string& id) { ownership_->Release(id); }
 
-  // Nothing is posted to the pool any longer; leases run out.
+  // From now on nothing is posted to the pool; leases run out.
   void Stop();
 
  private:

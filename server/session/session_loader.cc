@@ -255,7 +255,7 @@ void SessionLoader::FinishLoading(const FlightPtr& flight,
   if (made.ok() && *made != found.session) {
     (*made)->Close((*made)->CheckHeld().ok() ? Session::CloseReason::kDeleted
                                              : Session::CloseReason::kMoved);
-    *made = nullptr;  // its memory is free before anybody is answered
+    *made = nullptr;  // its memory is free before a caller is answered
   }
   if (found.loads_again) {
     StartLoading(flight);
@@ -307,7 +307,7 @@ void SessionLoader::Make(SessionRecord record, std::shared_ptr<const StoredMesh>
   std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
   Strand& strand = preparation->strand();
   caller.Tell(SessionStage::kWaiting);
-  // From now on: others may be making what this one needs, too.
+  // From now on: what this one needs may already be under way for other callers.
   auto follower = preparation->Follow(record.model, caller.tell);
   strand.Post(Lane::kBatch, [this, record = std::move(record), mesh = std::move(mesh),
                              preparation = std::move(preparation), caller = std::move(caller),
@@ -333,7 +333,7 @@ void SessionLoader::Keep(SessionView made, const SessionCallback& done) {
                  [this, session = std::move(made.session),
                   done](const absl::StatusOr<SessionRecord>& stored) mutable {
                    if (!stored.ok()) {
-                     session.reset();  // its memory is free before anybody hears of the failure
+                     session.reset();  // its memory is free before the caller hears of the failure
                      done(stored.status());
                      return;
                    }

@@ -97,7 +97,7 @@ class SessionLoader {
   // SESSION_MOVED, and need not wait for a store that may be away.
   void Lost(const std::string& id) ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // Nothing is posted to the pool any longer. Call it before the pool ends, and end the store's
+  // From now on nothing is posted to the pool. Call it before the pool ends, and end the store's
   // calls before this.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
@@ -124,7 +124,7 @@ class SessionLoader {
     bool wanted() const;
   };
   using FlightPtr = std::shared_ptr<Flight>;
-  // For whom a session is made.
+  // The caller for which a session is made.
   struct Caller {
     Cancellation cancellation;
     TellSession tell;  // may be empty

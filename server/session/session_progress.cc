@@ -72,7 +72,7 @@ void ProgressFeed::Tell(const SessionProgress& progress) {
       }
     }
   }
-  // Without the lock: what is told may come back for it.
+  // Without the lock: a follower may call back into code that takes it.
   for (const auto& follower : listening) follower->tell(progress);
 }
 

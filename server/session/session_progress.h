@@ -40,7 +40,7 @@ struct SessionProgress {
 
 SessionProgress ToSessionProgress(const PreparationProgress& progress);
 
-// Called from any thread, also when nobody listens any longer: short, and it waits for nothing. May
+// Called from any thread, also when its client no longer listens: short, and it must not block. May
 // be empty.
 using TellSession = std::function<void(const SessionProgress& progress)>;
 
@@ -57,7 +57,7 @@ class ProgressFeed {
   std::shared_ptr<const Follower> Follow(size_t topic, TellSession tell);
 
   void Begin(size_t topic);
-  // Nobody hears it outside of Begin and End.
+  // Followers only receive it between Begin and End.
   void Tell(const SessionProgress& progress);
   void End();
 
@@ -68,9 +68,9 @@ class ProgressFeed {
   std::optional<SessionProgress> newest_ ABSL_GUARDED_BY(mutex_);
 };
 
-// What of its progress a call is told: every stage, but where one counts no more than about five
-// steps a second. Nothing goes back: where the call of somebody else ended in the middle, what that
-// had done is done again, unseen.
+// The part of its progress that a call receives: every stage, but no more than about five steps a
+// second of a stage that counts. Nothing goes back: if another client's call ended in the middle,
+// its steps are done again without being shown.
 //
 // One thread at a time.
 class ProgressPace {
@@ -81,7 +81,7 @@ class ProgressPace {
   explicit ProgressPace(const Clock* clock) : clock_(clock) {}
 
   void Offer(const SessionProgress& progress);
-  // What is to be told now; empty: nothing.
+  // What to send now; empty: nothing.
   std::optional<SessionProgress> Take();
 
  private:

@@ -48,7 +48,7 @@ class SessionRegistry {
   const SessionTable& table() const { return table_; }
   WorkerPool& pool() { return *pool_; }
 
-  // This server does not hold the session any longer: it leaves memory, and its streams and watches
+  // This server no longer holds the session: it leaves memory, and its streams and watches
   // end (SessionEvent::kMoved), as do calls that wait for it to be loaded. Nothing where it has
   // been taken again since.
   void Lost(const std::string& id);
@@ -59,7 +59,7 @@ class SessionRegistry {
   // left run out.
   void HandOver(std::chrono::steady_clock::time_point deadline);
 
-  // Nothing is posted to the pool any longer. Call it before the pool ends.
+  // From now on nothing is posted to the pool. Call it before the pool ends.
   void Stop() {
     leases_->Stop();
     loader_.Stop();

@@ -28,7 +28,7 @@
 namespace tissueform {
 
 // What happens to a session, for streams and watches that follow it.
-// kMoved: this server does not hold it any longer.
+// kMoved: this server no longer holds it.
 enum class SessionEvent { kEvicted, kRestored, kDeleted, kMoved };
 // From any thread, without a lock held.
 using SessionObserver = std::function<void(const std::string& id, SessionEvent event)>;
@@ -91,7 +91,7 @@ class SessionTable {
   int size() const;
   // In memory or not.
   std::vector<std::string> KnownIds() const;
-  // Empty where it is not known, or nobody with a name has it.
+  // Empty where it is not known, or has no owner with a name.
   std::string OwnerOf(const std::string& id) const;
   int CountKnown() const;
   // In memory or not, those that are being created and those whose record is not deleted yet.
@@ -117,7 +117,7 @@ class SessionTable {
   // from it, are being made or are not deleted to the end), those of MeshCatalog::Remove.
   absl::Status RemoveMesh(const std::string& sha256);
 
-  // This server may not answer the session any longer: it leaves memory. Nothing where it has been
+  // This server may no longer answer the session: it leaves memory. Nothing where it has been
   // taken again since.
   void Lost(const std::string& id);
 

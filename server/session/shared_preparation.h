@@ -91,7 +91,7 @@ class SharedPreparation {
       const Cancellation& cancellation);
 
   // Hears how far it is for as long as the result lives, while MakeModel makes what the model
-  // needs, or PrepareResponse these answers, whoever has asked for it. Null where `tell` is empty.
+  // needs, or PrepareResponse these answers, for any caller. Null where `tell` is empty.
   std::shared_ptr<const ProgressFeed::Follower> Follow(DeformationModel model, TellSession tell);
   std::shared_ptr<const ProgressFeed::Follower> Follow(const ResponseRequest& request,
                                                        TellSession tell);

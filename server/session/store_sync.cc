@@ -217,7 +217,7 @@ void StoreSync::WriteUpdate(SessionView updated, const absl::StatusOr<SessionRec
                    if (status.ok()) {
                      done(std::move(view));
                    } else {
-                     view.session.reset();  // its memory is free before anybody hears of it
+                     view.session.reset();  // its memory is free before the caller hears of it
                      done(std::move(status));
                    }
                  });
@@ -299,7 +299,7 @@ void StoreSync::Erase(const std::string& id, const SessionLeaseHandlePtr& hold,
 void StoreSync::OnErased(const std::string& id, const SessionLeaseHandlePtr& hold,
                          const absl::Status& outcome, const StatusCallback& done) {
   const absl::Status status = hold == nullptr ? outcome : MovedIfFenced(outcome);
-  // Only now: a watch that is opened after it does not find the record any longer. If the record of
+  // Only now: a watch that is opened after it no longer finds the record. If the record of
   // a shared store is still there, the next call for the session finds it.
   const bool is_kept = hold != nullptr && !status.ok() && !absl::IsNotFound(status);
   table_->Notify(id, is_kept ? SessionEvent::kMoved : SessionEvent::kDeleted);

@@ -120,7 +120,7 @@ class StoreSync {
   // Frees its memory, which may have to wait; then the rest.
   static void End(const std::shared_ptr<Session>& session, const std::function<void()>& then);
   // Deletes the record of a session that has ended; then its id is free again. Erase does so also
-  // where this server does not hold it any longer: the store refuses if another has taken it.
+  // where this server no longer holds it: the store refuses if another has taken it.
   void EraseIfHeld(const std::string& id, const SessionLeaseHandlePtr& hold,
                    const StatusCallback& done);
   void Erase(const std::string& id, const SessionLeaseHandlePtr& hold, const StatusCallback& done);

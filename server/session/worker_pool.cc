@@ -60,7 +60,7 @@ void WorkerPool::Post(Lane lane, Job job, std::chrono::steady_clock::time_point 
   Queue& queue = queues_[static_cast<size_t>(lane)];
   queue.jobs.push_back({std::move(job), since});
   ++unfinished_;
-  // Under the lock: once the job has run, whoever waited for it may destroy the pool.
+  // Under the lock: once the job has run, a thread that waited for it may destroy the pool.
   queue.job_or_stop.NotifyOne();
 }
 
@@ -89,7 +89,7 @@ void WorkerPool::Work(Lane lane) {
     measures.waited.Observe(start - job.since);
     job.job();
     measures.ran.Observe(std::chrono::steady_clock::now() - start);
-    job.job = nullptr;  // what it holds goes before anybody sees it finished
+    job.job = nullptr;  // what it holds goes before another thread sees it finished
     mutex_.Lock();
     if (--unfinished_ == 0 && stopping_) {
       for (Queue& other : queues_) other.job_or_stop.NotifyAll();

@@ -21,7 +21,7 @@ namespace tissueform {
 // What a job may hold up. Every lane has threads of its own, so that none waits behind another
 // lane's job; where processors are short the operating system gives them to the earlier lane.
 enum class Lane {
-  kFrames,      // products of prepared answers: below a millisecond, somebody looks at it
+  kFrames,      // products of prepared answers: below a millisecond, a user watches the result
   kSolves,      // one back-substitution, and what ends sessions
   kIterations,  // answers of many solves
   kLeases,      // takes sessions, gives them back, asks who may use them: waits 2 s at most for the

@@ -12,7 +12,7 @@
 // Rows that decide who may do what, by key, and as bytes (tissueform.store.v1).
 namespace tissueform {
 
-// What somebody may do with another's resource. Each may all that the ones before may.
+// What a principal may do with another's resource. Each role includes those before it.
 enum class ShareRole { kViewer = 1, kPlanner = 2 };
 
 // By owner, resource and principal there is one.
@@ -21,7 +21,7 @@ struct ShareRow {
   // has in the project.
   std::string resource = {};
   std::string owner = {};
-  std::string principal = {};  // to whom
+  std::string principal = {};  // that may use it
   ShareRole role = ShareRole::kViewer;
 
   friend bool operator==(const ShareRow&, const ShareRow&) = default;

@@ -51,7 +51,7 @@ BlobStore::Pin BlobStore::PinTo(const std::string& sha256) {
 absl::StatusOr<bool> BlobStore::Has(const std::string& sha256, int64_t bytes) const {
   const absl::StatusOr<int64_t> size = Size(sha256);
   if (!size.ok() || *size != bytes) return false;
-  // Whoever has written it may have died before the folder was synced.
+  // The process that has written it may have died before the folder was synced.
   TF_RETURN_IF_ERROR(SyncFolder(folder_));
   return true;
 }

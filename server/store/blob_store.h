@@ -67,7 +67,7 @@ class BlobStore {
     int64_t bytes_ = 0;
   };
 
-  // Makes the folder where there is none, and removes what a crash has left half-written.
+  // Creates the folder if it does not exist, and removes what a crash has left half-written.
   static absl::StatusOr<std::unique_ptr<BlobStore>> Open(std::string folder,
                                                          std::string damaged_folder);
 
@@ -109,7 +109,7 @@ class BlobStore {
   const std::string folder_;
   const std::string damaged_folder_;
 
-  Mutex mutex_;  // also held while a file is removed, so that nobody finds it just then
+  Mutex mutex_;  // also held while a file is removed, so that no caller finds it just then
   std::map<std::string, int> pins_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -20,7 +20,7 @@
 
 namespace tissueform {
 
-// What a case is found by: everybody who has sent a file has a case of it.
+// The key of a case: each user who has sent a file has a case of it.
 struct CaseKey {
   std::string sha256 = {};
   std::string owner = {};
@@ -55,8 +55,8 @@ class CaseWriter {
   // or what the disk says. No use after an error.
   absl::Status Write(int64_t offset, absl::string_view bytes);
 
-  // Keeps the case, for good as far as the store does; returns it as it is kept: where it had come
-  // in the meantime as that one, of which only last_used_s rises. Once.
+  // Keeps the case, for good as far as the store does; returns it as it is kept. If the same case
+  // has come since Begin, that one stays, and only its last_used_s rises. Once.
   //
   // Errors: InvalidArgument (bytes are missing), DataLoss (the digest is another: damaged on its
   // way), ResourceExhausted (there are as many as may be; the disk is full), or what the disk says.
@@ -83,8 +83,8 @@ class CaseReader {
 
   int64_t total_bytes() const { return total_bytes_; }
 
-  // `size` bytes from `offset` on, fewer at the end. Whoever reads all of them in order from 0 has
-  // their digest checked by the last call.
+  // `size` bytes from `offset` on, fewer at the end. For a caller that reads all of them in order
+  // from 0, the last call checks their digest.
   //
   // Errors: DataLoss (they are not what was kept; the case is set aside then), or what the disk
   // says. REQUIRES: 0 <= offset <= total_bytes(), size > 0.
@@ -107,8 +107,8 @@ class CaseReader {
   Sha256 digest_;
 };
 
-// Where cases are kept: files that nobody here looks into, named by their SHA-256, one case for
-// each of their owners. They never change.
+// Where cases are kept: files that the server does not interpret, named by their SHA-256, one case
+// for each of their owners. They never change.
 //
 // Calls block; durable when answered; thread-safe: as MeshStore. Writers and readers must not
 // outlive their store.
@@ -148,7 +148,7 @@ class CaseStore {
   // last_used_s rises to it. Those that are not there are passed over.
   virtual absl::Status Touch(const CaseKey& key, int64_t now_s) = 0;
 
-  // Deletes those that nobody has used since then, but the names in `spared`; at most `most`.
+  // Deletes those that were not used since then, but the names in `spared`; at most `most`.
   // Returns them.
   virtual absl::StatusOr<std::vector<CaseKey>> RemoveUnused(int64_t before_s,
                                                             const std::set<std::string>& spared,

@@ -40,7 +40,7 @@ class MeshStore {
   virtual ~MeshStore() = default;
 
   // Keeps a mesh. Where it is kept already only last_used_s may rise. REQUIRES: record.sha256 is
-  // the payload's (whoever checked the upload has computed it).
+  // the payload's (the code that checked the upload has computed it).
   //
   // Errors: InvalidArgument (no SHA-256; shape or size is not the payload's), ResourceExhausted
   // (the disk is full), or what the disk says.

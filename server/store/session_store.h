@@ -27,7 +27,7 @@ inline constexpr int64_t kFreshEpoch = 0;
 //
 // Asynchronous: a call returns at once or soon, and `done` is called exactly once, from the calling
 // thread or another, without a lock of the store held. What `done` has said is durable as far as
-// the store is. Records are values: nobody sees another's changes to a copy.
+// the store is. Records are values: a change to one copy changes no other.
 //
 // Two writers cannot overwrite each other: an update names the etag of the version that it was made
 // from. A writer who no longer owns a session cannot write to it: every write carries an epoch, and
@@ -79,7 +79,7 @@ class SessionStore {
   virtual void CommitPoses(const std::string& id, std::vector<HandlePose> poses, int64_t epoch,
                            StatusCallback done) = 0;
 
-  // Whatever its etag when `etag` is empty. Errors: those of Update.
+  // Deletes any version when `etag` is empty. Errors: those of Update.
   virtual void Delete(const std::string& id, const std::string& etag, int64_t epoch,
                       StatusCallback done) = 0;
 
@@ -87,7 +87,7 @@ class SessionStore {
   virtual void List(const ListRequest& request, PageCallback done) = 0;
 
   // Says that these are in use, all in one write; ids that are not there do not count. A record's
-  // last_used_s never goes back, whatever the clock does.
+  // last_used_s never goes back, even if the clock does.
   virtual void Touch(std::vector<std::string> ids, int64_t now_s, StatusCallback done) = 0;
 
   // Records of all owners that were last used before that time, longest unused first, up to `limit`

@@ -20,7 +20,7 @@ namespace tissueform {
 // The database of a folder, with tables of this version and without a damaged page.
 struct OpenedDatabase {
   std::unique_ptr<Database> database;
-  // Rows may be missing, because it is new or was mended: a blob that no row claims is then no
+  // Rows may be missing, because it is new or was repaired: a blob that no row claims is then not a
   // leftover, and is kept.
   bool rows_may_be_missing = false;
 };
@@ -28,8 +28,8 @@ struct OpenedDatabase {
 // Opens or makes it. One with damaged pages is copied to the folder `damaged`, and what rows can be
 // read take its place; that goes to the list.
 //
-// Errors: FailedPrecondition (no database of ours, or by a newer server), DataLoss (cannot be
-// mended: put a backup back), or those of Database.
+// Errors: FailedPrecondition (not our database, or one by a newer server), DataLoss (cannot be
+// repaired: put a backup back), or those of Database.
 absl::StatusOr<OpenedDatabase> OpenCheckedDatabase(const DataFolder& folder, int64_t now_s,
                                                    std::vector<DamagedItem>* damaged);
 

@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// What the stores refuse, in the same words whatever they keep it in.
+// What the stores refuse, in the same words for every kind of storage.
 
 absl::Status NoSession(absl::string_view id);      // NotFound
 absl::Status SessionExists(absl::string_view id);  // AlreadyExists

@@ -16,7 +16,7 @@ namespace tissueform {
 namespace {
 
 constexpr size_t kSealBytes = 64;
-// Far beyond what any server takes; so that sizes fit into 64 bits, whatever a record says.
+// Far beyond what any server takes; so that sizes fit into 64 bits, for any record.
 constexpr int64_t kMaxElements = int64_t{1} << 40;
 constexpr int kMaxCellArrays = 1 << 10;
 

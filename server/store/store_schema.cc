@@ -47,7 +47,7 @@ constexpr char kVersion3[] =
     "CREATE TABLE cases (key INTEGER PRIMARY KEY, sha256 TEXT NOT NULL UNIQUE, "
     "owner TEXT NOT NULL, record BLOB NOT NULL, last_used_s INTEGER NOT NULL) STRICT;";
 
-// Everybody who has sent a file has a case of it.
+// Each user who has sent a file has a case of it.
 constexpr char kVersion4[] =
     "CREATE TABLE owned_cases (key INTEGER PRIMARY KEY, sha256 TEXT NOT NULL, owner TEXT NOT NULL, "
     "record BLOB NOT NULL, last_used_s INTEGER NOT NULL, UNIQUE (sha256, owner)) STRICT;"

@@ -20,7 +20,7 @@ namespace tissueform {
 
 // All that a server keeps: sql_stores.h.
 //
-// Its end waits for the calls that were made; none may be made any longer.
+// Its end waits for the calls that were made; no more may be made then.
 class Stores {
  public:
   virtual ~Stores() = default;
@@ -43,7 +43,7 @@ class Stores {
   // Unix seconds, for what is kept: this machine's clock, or that of a database which several
   // servers share, as it was asked last. Fast.
   virtual int64_t NowS() const { return SystemUnixSeconds(); }
-  // Asks the database. Blocks. Errors: what the store says; then nobody knows what is old.
+  // Asks the database. Blocks. Errors: what the store says; then it is unknown what is old.
   virtual absl::Status AskTime() { return absl::OkStatus(); }
 };
 

@@ -50,7 +50,7 @@ std::string MarkBytes(int64_t synced) {
   return bytes;
 }
 
-// 0 where the mark is none: nothing of the part can be trusted.
+// 0 where the mark is invalid: nothing of the part can be trusted.
 int64_t ReadMark(absl::string_view bytes) {
   int64_t synced = 0;
   int64_t complement = 0;
@@ -85,7 +85,7 @@ struct UploadStore::Part {
     if (synced == size) return absl::OkStatus();
     if (broken) return Damaged(announcement.sha256, "it could not be synced; start it again");
     // After a sync that failed the kernel may have thrown the bytes away, and the next sync would
-    // say OK all the same: such a part cannot be mended.
+    // return OK nevertheless: such a part cannot be repaired.
     broken = true;
     TF_RETURN_IF_ERROR(data.Sync());
     TF_FAULT_POINT("upload.part_synced");
@@ -111,7 +111,7 @@ struct UploadStore::Part {
       std::chrono::steady_clock::now();
   bool broken ABSL_GUARDED_BY(mutex) = false;   // a sync has failed
   bool named ABSL_GUARDED_BY(mutex) = false;    // the folder is synced
-  bool dropped ABSL_GUARDED_BY(mutex) = false;  // its files are gone; whoever still has it looks
+  bool dropped ABSL_GUARDED_BY(mutex) = false;  // its files are gone; checked before each use
 };
 
 UploadStore::UploadStore(std::string folder, UploadLimits limits, bool durable)

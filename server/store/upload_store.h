@@ -27,36 +27,36 @@ struct UploadAnnouncement {
   std::string owner = {};  // who sends it
 };
 
-// What its part is called: the mesh's SHA-256, or of somebody with a name a digest of both. So
-// nobody goes on with what another has sent, or hears of it.
+// The name of its part: the mesh's SHA-256, or of an owner with a name a digest of both. So a user
+// can neither continue nor detect another user's upload.
 std::string PartName(const UploadAnnouncement& announcement);
 
 struct UploadLimits {
   int64_t max_bytes = int64_t{8} << 30;  // received of all parts together
   int max_parts = 256;
-  // Where a new part finds no place, those go, the oldest first, to which nothing has come for so
-  // long: else whoever breaks off 256 uploads keeps all others out for a day.
+  // Where a new part finds no place, parts that have received nothing for so long go, the oldest
+  // first: otherwise a client that breaks off 256 uploads keeps all others out for a day.
   std::chrono::seconds spared{600};
   // Bytes that have come since a part was synced and so long ago are synced with the next ones, so
   // that of an upload over a slow line little is lost with the server.
   std::chrono::milliseconds sync_every{2'000};
 };
 
-// Meshes that have not arrived in full: one file each (PartName.part) with what was announced
-// beside it (PartName.announced), so that an upload goes on after a restart, and no memory is
+// Meshes that have not arrived in full: one file each (PartName.part) and one with the announcement
+// (PartName.announced), so that an upload goes on after a restart, and no memory is
 // needed before it is whole.
 //
 // What is said to be committed (Begin, Committed) is on the disk: these sync first. Between them a
 // part is synced every kSyncEveryBytes and UploadLimits::sync_every. After a restart a part ends
-// where it was last synced, so call Committed where a stream ends, in whatever way.
+// where it was last synced, so call Committed however a stream ends.
 //
 // Calls block on the disk. Thread-safe; calls for one part take turns.
 class UploadStore {
  public:
   static constexpr int64_t kSyncEveryBytes = int64_t{16} << 20;
 
-  // Takes up the parts that lie in the folder; it is made where there is none. A part that cannot
-  // be taken up (cut, damaged, announced otherwise) is removed: its client begins anew. Errors:
+  // Takes up the parts in the folder; creates the folder if it does not exist. A part that cannot
+  // be taken up (cut, damaged, announced differently) is removed: its client starts again. Errors:
   // what the disk says.
   static absl::StatusOr<std::unique_ptr<UploadStore>> Open(std::string folder,
                                                            UploadLimits limits = {});
@@ -81,7 +81,7 @@ class UploadStore {
   absl::Status Append(const std::string& part_name, int64_t offset, absl::string_view bytes);
 
   // How many bytes are there, after they were synced. Errors: NotFound, or what the disk says;
-  // DataLoss from then on, until it is begun anew.
+  // DataLoss from then on, until it is started again.
   absl::StatusOr<int64_t> Committed(const std::string& part_name);
 
   // What was announced. Errors: NotFound.

@@ -19,16 +19,16 @@
 
 namespace tissueform {
 
-// Writes who has called what into an audit log, as one JSON object per event: every call when it
-// ends, a stream also when it opens and when it names its resource. Nothing that a call brings or
-// is answered goes there.
+// Writes which caller has called what into an audit log, as one JSON object per event: every call
+// when it ends, a stream also when it opens and when it names its resource. Nothing of what a call
+// sends or receives goes there.
 //
-// Left out are calls that touch no content: what the server is (GetServerInfo), who one is
+// Left out are calls that touch no content: what the server is (GetServerInfo), the caller's name
 // (WhoAmI), and the acknowledgements of a watch. All others are refused while the log cannot be
-// written, those that only look too: a look that nobody records is what an audit is there against.
+// written, also those that only read: an audit must not miss a single read.
 //
-// Calls that were never let in (not known, draining, refused here) are told, too, but only so many
-// a second; of the rest the number.
+// Calls that were never let in (not known, draining, refused here) are logged, too, but only so
+// many a second; of the rest only the number.
 //
 // Thread-safe.
 class AuditObserver final : public CallObserver {
@@ -52,7 +52,7 @@ class AuditObserver final : public CallObserver {
  private:
   bool IsLeftOut(std::string_view method) const { return left_out_.contains(method); }
   bool IsStream(std::string_view method) const { return streams_.contains(method); }
-  // Whether one more refused call is told by a line of its own.
+  // Whether one more refused call gets a line of its own.
   bool MayTellRefused() ABSL_LOCKS_EXCLUDED(mutex_);
   void TellUntoldRefused(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 

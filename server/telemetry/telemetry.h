@@ -21,8 +21,8 @@
 
 namespace tissueform {
 
-// What a server tells of its calls: metrics always, an audit where the options ask for one. It is
-// to be told of every call. Thread-safe.
+// What a server reports of its calls: metrics always, an audit where the options ask for one. It
+// must observe every call. Thread-safe.
 class Telemetry final : public CallObserver {
  public:
   // `identity` and `data_folder` as in OpenAuditSink. Errors: those of OpenAuditSink.
@@ -47,7 +47,7 @@ class Telemetry final : public CallObserver {
 
   CallMetrics call_metrics_;
   SessionEventCounts session_events_;
-  std::unique_ptr<AuditLog> audit_log_;  // null: there is none
+  std::unique_ptr<AuditLog> audit_log_;  // null: no audit
   std::optional<AuditObserver> audit_observer_;
 };
 

@@ -26,7 +26,7 @@ class Event:
     at: float
     what: str
     held: set = dataclasses.field(default_factory=set)  # sessions of the server that it was done to
-    stops_all: bool = False  # nobody is answered until it is over
+    stops_all: bool = False  # no client is answered until it is over
     seen_after_s: float = 0  # so much later proxies know
     back_at: float = None
 

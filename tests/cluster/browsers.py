@@ -79,7 +79,7 @@ class SocketDrag(drags.Drag):
             for request in stream.requests():
                 asyncio.run_coroutine_threadsafe(socket.send(self._frame(MESSAGE, request)), loop).result(drags.SILENCE_S)
         except Exception:  # pylint: disable=broad-except
-            pass  # the socket has ended, which is told where it is read
+            pass  # the socket has ended, which its reader reports
 
     def _take(self, stream, data):
         from tissueform.v1 import gateway_pb2

@@ -224,7 +224,7 @@ def main():
         print("\n".join(missing))
         sys.exit(SKIPPED)
     seed = options.seed if options.seed is not None else random.SystemRandom().randrange(10**6)
-    # Whoever ends this ends what it has started.
+    # A signal that ends this also ends what it has started.
     signal.signal(signal.SIGTERM, end_once)
     sys.exit(chaos(options, seed))
 

@@ -193,7 +193,7 @@ class Follower(threading.Thread):
     def _follow(self):
         from google.protobuf import empty_pb2
         from tissueform.v1 import deform_service_pb2 as protocol
-        # A bounded call, since whoever only listens hears nothing of a server that is gone.
+        # A bounded call, since a client that only listens hears nothing of a server that is gone.
         self.call = self.server.method("DeformService/Watch", protocol.WatchResponse, "unary_stream")(
             protocol.WatchRequest(session=self.session), metadata=self.route.metadata(), timeout=60)
         acknowledge = self.server.method("DeformService/AcknowledgeWatch", empty_pb2.Empty)

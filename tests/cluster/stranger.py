@@ -21,7 +21,7 @@ FIRST_WAIT_S, MOST_WAIT_S = 0.05, 0.4
 LASTING_S = 2  # what ends sooner after an answer has come to nothing: a server may let streams begin and end them at once
 ATTEMPT_S = 15
 ELSEWHERE = {"SESSION_MOVED", "MEMORY_BUDGET_FULL"}
-# Whatever the code: through HAProxy an error that ends a stream early may arrive as CANCELLED, with the server's details.
+# With any code: through HAProxy an error that ends a stream early may arrive as CANCELLED, with the server's details.
 LATER = ELSEWHERE | {"WRONG_NODE", "SERVER_DRAINING", "UNAVAILABLE", "SESSION_BEING_DELETED"}
 # What a proxy or a cut connection says where a server has said nothing.
 FROM_THE_WAY = {grpc.StatusCode.UNKNOWN, grpc.StatusCode.INTERNAL, grpc.StatusCode.CANCELLED, grpc.StatusCode.DEADLINE_EXCEEDED}

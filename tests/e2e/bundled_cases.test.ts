@@ -58,7 +58,17 @@ describe.each(["head", "three_segments"])("the bundled case %s", (name) => {
   test("gives out a plan that plan check and deform take, with the movements of C++", async () => {
     const { page } = opened;
     await moveLowerJaw(page);
+    const table = page.locator("section[aria-label=Movements]");
+    await expect.poll(() => table.getByRole("row", { name: /^Soft pogonion/ }).innerText()).toMatch(/of this surgery \d+\.\d, model 1\.\d/);
+    await table.getByText("where 95 of 100 patients will be").waitFor();
+    // The upper jaw rests, and what misses the plan of the lower jaw does not move it.
+    if (name === "head") expect(await table.getByRole("row", { name: /^Upper incisor/ }).innerText()).not.toMatch(/surgery/);
     const path = await saveExport(planner, page, "Plan JSON", "tissueform-plan.json");
+    const { landmarks } = readJson(path);
+    const chin = landmarks.find((landmark: any) => landmark.name === "soft_pogonion");
+    expect(chin.interval_of).toMatch(/^surgery(, model and material| and model)$/);
+    expect(chin.lowest_total_mm).toBeLessThan(chin.totalMm);
+    expect(chin.highest_total_mm).toBeGreaterThan(chin.totalMm);
     await saveExport(planner, page, "Case file", "tissueform-case.tfcase");
     expect(run("tissueform", "plan", "check", path)).toContain("the plan is ready");
     run("tissueform", "deform", path, "--out", at("exported.vtu"));

@@ -13,7 +13,7 @@ import { Planner, Program, type Hook, live, openCase, openPage, startGateway, st
 //
 //   pg_virtualenv -t npm --prefix client/web run test:e2e -- failover.test.ts
 //
-// With TISSUEFORM_PICTURES=FOLDER also pictures of what the page says meanwhile and afterwards: moved.jpg, gone-on.jpg.
+// With TISSUEFORM_PICTURES=FOLDER also pictures of what the page says during the failover and afterwards: moved.jpg, gone-on.jpg.
 
 const { PGHOST, PGPORT, PGUSER, PGPASSWORD, TISSUEFORM_PICTURES } = process.env;
 if (PGPORT === undefined) console.log("no PostgreSQL: run this with pg_virtualenv (package postgresql-common)");
@@ -129,7 +129,7 @@ function drag(page: Page, forwardMm: number): Promise<number> {
   }, forwardMm);
 }
 
-/** From now on the lower jaw goes to and fro, and the header's words are written down. */
+/** From now on the lower jaw moves back and forth, and the header's words are written down. */
 function moveOn(page: Page): Promise<void> {
   return page.evaluate(() => {
     const { bench } = (globalThis as unknown as Hook).tissueform;

@@ -14,7 +14,7 @@ const ASK_AGAIN_MS = 50;
 
 export const hasHaproxy = HAPROXY !== undefined;
 
-/** "127.0.0.1:PORT" at which nobody listens. */
+/** "127.0.0.1:PORT" at which no process listens. */
 export async function freeAddress(): Promise<string> {
   const server = createServer();
   await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));

@@ -7,10 +7,10 @@ import type { AddressInfo } from "node:net";
 import Provider, { type Configuration } from "oidc-provider";
 import type { Page } from "playwright-core";
 
-/** For whom tokens are: what the server is started with. */
+/** The audience of the tokens: what the server is started with. */
 export const AUDIENCE = "https://tissueform.example.org";
 
-/** An identity provider of loopback, by a program that nobody here wrote: its users sign in with any password. */
+/** An identity provider on loopback, by a program of another project: its users sign in with any password. */
 export class IdentityProvider {
   /** How long a token is good. */
   tokenSeconds = 3600;
@@ -24,7 +24,7 @@ export class IdentityProvider {
   static async start(): Promise<IdentityProvider> {
     const provider = new IdentityProvider();
     await provider.listen();
-    // Servers ask for keys at their start, when nobody knows yet where pages will come from.
+    // Servers ask for keys at their start, when the address of the pages is not yet known.
     provider.admit(provider.issuer);
     return provider;
   }

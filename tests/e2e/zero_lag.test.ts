@@ -51,7 +51,7 @@ async function ready(page: Page, model?: number): Promise<Ready> {
 
 const MOST_TRIES = 5;
 
-/** The same, and not beside the page: where the machine was too busy when it was measured a worker has the work, and it is measured anew. */
+/** The same, and in the page itself: if the machine was too busy when it was measured a worker has the work, and it is measured again. */
 async function readyInPage(page: Page, model?: number): Promise<Ready> {
   for (let tries = 1; ; ++tries) {
     const state = await ready(page, model);

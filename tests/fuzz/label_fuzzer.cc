@@ -25,7 +25,7 @@ void Require(bool promise) {
   if (!promise) std::abort();
 }
 
-// A message is one line of printable text whatever the names are.
+// A message is one line of printable text for all names.
 void CheckText(absl::string_view text) {
   for (const char letter : text) Require(letter >= 32 && letter < 127);
 }

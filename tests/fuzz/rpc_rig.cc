@@ -78,7 +78,7 @@ void CheckEnd(const std::optional<grpc::Status>& status) {
   Require(status.has_value());
   switch (status->error_code()) {
     case grpc::StatusCode::OK:
-    case grpc::StatusCode::CANCELLED:  // by the client, to whom nothing more is said
+    case grpc::StatusCode::CANCELLED:  // by the client, which receives nothing more
       return;
     case grpc::StatusCode::INVALID_ARGUMENT:
     case grpc::StatusCode::NOT_FOUND:

@@ -27,7 +27,7 @@ void Demand(bool promise) {
   if (!promise) std::abort();
 }
 
-// A refusal is one bounded, printable sentence, whatever came.
+// A refusal is one bounded, printable sentence for any input.
 void CheckRefusal(const absl::Status& status) {
   const absl::string_view message = status.message();
   Demand(absl::IsUnauthenticated(status) && message.size() < 600);

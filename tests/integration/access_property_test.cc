@@ -23,9 +23,9 @@
 #include "tests/integration/access_world.h"
 #include "tests/integration/service_test.h"
 
-// Two tenants, somebody who is shown things, and follow links call all rpcs with names that are
+// Two tenants, a user with shares, and follow links call all rpcs with names that are
 // their own, another's, shared, gone or invented. The server must answer as AccessWorld says: in
-// TISSUEFORM_ACCESS_CALLS calls (5,000 when that is not set) no answer to whom it is not for.
+// TISSUEFORM_ACCESS_CALLS calls (5,000 when that is not set) callers without access get no answer.
 namespace tissueform::testing {
 namespace {
 
@@ -258,7 +258,7 @@ class AccessPropertyTest : public ServiceTest {
     const std::string name = invented ? Invented(Kind::kMesh) : mesh.name;
     v1::CreateSessionRequest request = ToProto(mesh.problem.Request(name));
     request.set_project(OneIn(2) ? "p" : "");
-    // Of all principals alike: they are everybody's own.
+    // The same ids for all principals: each principal has its own requests.
     request.set_request_id(absl::StrCat("request-", Below(3)));
     request.clear_session_id();
     v1::Session session;

@@ -26,14 +26,14 @@ struct AccessWorld {
     std::string owner;
     std::string session;
     std::string mesh;
-    std::string case_name = {};  // may be empty, and anybody's
+    std::string case_name = {};  // may be empty, and of any owner
   };
   struct Link {
     std::string session;
     std::string maker;
     std::string case_name;  // may be empty
   };
-  // Whoever calls: a principal, or the bearer of a link.
+  // The caller: a principal, or the bearer of a link.
   struct Caller {
     std::string name;
     std::string link;  // its token; empty: none

@@ -176,7 +176,7 @@ TEST_F(DoctorTest, ATokenThatHasEndedByTheClockHereIsForTheServerToJudge) {
   const DoctorReport report = AskDoctor(
       {.address = name(),
        .options = {.token_file = WriteToken(With(GoodClaims(), "exp", SecondsFromNow(-7200)))}});
-  // This server asks nobody who they are.
+  // This server does not require authentication.
   EXPECT_FALSE(report.failed()) << report.Text();
   EXPECT_THAT(report.Text(),
               AllOf(HasSubstr("ended 2 h ago by this machine's clock"), HasSubstr("log in again")));
@@ -277,7 +277,7 @@ TEST_P(DoctorOldProxyTest, IsNamedWithWhatAlpnSelects) {
   const DoctorReport report =
       AskDoctor({.address = absl::StrCat("localhost", port), .options = {.tls_ca = own_.roots}});
   ExpectEndsWith(report, "encryption", GetParam().found, "offer h2 by ALPN");
-  // A client that forgets TLS is told of that.
+  // A client without TLS options gets a hint.
   ExpectEndsWith(AskDoctor({.address = absl::StrCat("localhost", port)}), "encryption",
                  "speaks TLS", "--tls-ca");
 }

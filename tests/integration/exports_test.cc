@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// No file of it is needed: a server takes a prediction's case as it is told.
+// No file of it is needed: a server does not check the case that a prediction names.
 const std::string kCase = "cases/" + std::string(64, 'c');
 
 v1::Measure SomeMeasure(const std::string& name = "e_line_upper_lip") {

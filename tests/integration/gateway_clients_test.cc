@@ -14,7 +14,7 @@
 #include "tests/integration/served_cli_test.h"
 #include "tests/testing/test_paths.h"
 
-// The real gateway before the real server, asked by clients that nobody here wrote.
+// The real gateway before the real server, asked by client libraries of other projects.
 namespace tissueform::testing {
 namespace {
 

@@ -100,7 +100,7 @@ TEST_P(HeadBandTest, OfAThousandPosesIsThatOfTheServer) {
   }
   RecordProperty("most_off_mm", std::to_string(most_off_mm));
   EXPECT_EQ(compared, kPoses);
-  // A quarter of a step that it is told in; less than what is proven of all such poses.
+  // A quarter of the step of its encoding; less than what is proven of all such poses.
   EXPECT_LT(most_off_mm, 0.025);
   EXPECT_GT(largest_mm, 1) << "of bands that are worth a test";
 }

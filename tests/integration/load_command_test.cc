@@ -12,8 +12,8 @@
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/test_paths.h"
 
-// `tissueform load` as a real program against a real server; what its times are is nobody's
-// business here.
+// `tissueform load` as a real program against a real server. The test does not check
+// the times that it measures.
 namespace tissueform::testing {
 namespace {
 

@@ -35,7 +35,7 @@ class MetricsTest : public ServiceTest {
 
   std::string Page() { return HttpGet(server().metrics_port(), "/metrics"); }
 
-  // The value of a line of the page; -1 where there is none.
+  // The value of a line of the page; -1 without that line.
   double Value(const std::string& line) {
     const std::string page = Page();
     const size_t start = page.find(absl::StrCat("\n", line, " "));

@@ -220,7 +220,7 @@ absl::Status ComparePredictions(ModelState& state, const Numbers& numbers) {
     key = state.model.predictions.at(other).key;
   }
   const Positions* to = state.answers.Find(key);
-  if (to == nullptr) return absl::OkStatus();  // nobody has asked for it
+  if (to == nullptr) return absl::OkStatus();  // no call has asked for it
   const double largest = (*to - from).rowwise().norm().maxCoeff();
   const double told_largest = told->comparison.distances().max_mm();
   if (told_largest == largest) return absl::OkStatus();

@@ -41,7 +41,7 @@ class ModelAnswers {
   // Internal unless the answer is that of a deformer in this process, as far as float32 goes, and
   // to the last bit the same every time.
   absl::Status Check(const AnswerQuestionKey& key, const Positions& answer);
-  // Null: nobody has asked.
+  // Null: no call has asked.
   const Positions* Find(const AnswerQuestionKey& key) const;
 
  private:

@@ -41,7 +41,7 @@ def main():
         while len(words) < PINGS_AT_MOST and (not words or words[-1] == "answered"):
             connection.sendall(frame(PING, bytes(8)))
             words.append(next_word(stream))
-        # A server that sends a window update of its own between two pings begins to count anew, so more may be answered.
+        # A server that sends a window update of its own between two pings starts its count again, so more may be answered.
         print("first three:", words[:3])
         print("end:", words[-1])
 

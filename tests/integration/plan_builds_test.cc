@@ -251,7 +251,7 @@ TEST_F(PlanBuildsOfServerTest, APlanIsThatOfTheCommandByteForByte) {
   v1::BuildFile file;
   EXPECT_EQ(stub_->GetBuildFile(ContextOf(ann_).get(), get_file, &file).error_code(),
             Code::NOT_FOUND);
-  // Nobody else hears of either.
+  // No other user hears of either.
   v1::GetPlanBuildRequest get_build;
   get_build.set_name(done.name());
   v1::PlanBuild build;

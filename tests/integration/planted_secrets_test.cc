@@ -133,7 +133,7 @@ TEST_F(PlantedSecretsTest, AreNeitherInLogNorMetricsNorAudit) {
   EXPECT_THAT(HttpGet(server().metrics_port(), "/metrics"), Not(HasSubstr("PLANTED")));
   EXPECT_THAT(log_.str(), Not(HasSubstr("PLANTED")));
 
-  // They would be seen: what may be told is there.
+  // They would be seen: the values that may be logged are there.
   EXPECT_THAT(Audit(), HasSubstr("\"rpc\":\"PredictionService.CreatePrediction\""));
   EXPECT_THAT(log_.str(), HasSubstr(absl::StrCat("\"traceparent\":\"", kTraceparent, "\"")));
   EXPECT_THAT(log_.str(), HasSubstr(absl::StrCat("\"request_id\":\"", kRequestId, "\"")));

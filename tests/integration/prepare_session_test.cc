@@ -56,7 +56,7 @@ TEST_F(PrepareSessionServiceTest, GivesASessionThatAnswersAsACreatedOneDoes) {
   *request.mutable_stream() = DeformStream::ConfigurationOf(stream);
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client->PrepareSession(request, Listening()));
   ASSERT_THAT(told_, Not(IsEmpty()));
-  // At the network's mercy only the newest is told: but never one before another.
+  // A slow network may deliver only the newest progress, but stages never go back.
   for (size_t i = 1; i < told_.size(); ++i) EXPECT_GE(told_[i].stage(), told_[i - 1].stage());
   EXPECT_THAT(ProgressText(told_.front()), Not(IsEmpty()));
   ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
@@ -106,7 +106,7 @@ TEST_F(PrepareSessionServiceTest, ACancelledWaitEndsAndLeavesNothing) {
     return server().sessions().table().size() == 0 &&
            server().memory_budget().reserved_bytes() == mesh_bytes;
   }));
-  // The same request again: joins what is being given up, or makes it anew.
+  // The same request again: joins what is being given up, or starts it again.
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client->PrepareSession(request, {}));
   EXPECT_THAT(client->DeleteSession(session.name()), IsOk());
 }

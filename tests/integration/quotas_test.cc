@@ -15,7 +15,7 @@
 #include "tests/integration/access_calls.h"
 #include "tests/integration/service_test.h"
 
-// What one principal may take, and that nobody else feels it.
+// What one principal may take, and that no other one is affected.
 namespace tissueform::testing {
 namespace {
 

@@ -77,18 +77,18 @@ TEST_F(RestartTest, ADragGoesOnThroughKillAndRestart) {
   drag->Ack(*frame);
   const std::string before = frame->positions();
   drag->SendPoses(2, TopPose(SomePose(2)));
-  frame = drag->Receive();  // what was committed has been told by then or is sent again
+  frame = drag->Receive();  // the commit has been acknowledged by then or is sent again
   ASSERT_TRUE(frame.has_value());
   drag->Ack(*frame);
 
   ASSERT_NO_FATAL_FAILURE(Kill());
   std::thread restart([this] { Start(); });
-  drag->SendPoses(3, TopPose(SomePose(1)));  // nobody is there
+  drag->SendPoses(3, TopPose(SomePose(1)));  // no server is there
   frame = drag->Receive();
   restart.join();
   ASSERT_TRUE(frame.has_value()) << drag->Finish();
   drag->Ack(*frame);
-  // The drag begins anew with what was not known to be committed, then comes the newest pose.
+  // The drag starts again with what was not known to be committed, then comes the newest pose.
   while (frame.has_value() && frame->sequence() != 3) {
     frame = drag->Receive();
     if (frame.has_value()) drag->Ack(*frame);

@@ -76,7 +76,7 @@ struct ServedModel {
 
   int CountMadeFrom(const std::string& mesh) const;
   ServedSession* Find(const std::string& session);
-  // Null where there is none.
+  // Null if it does not exist.
   const std::string* FindRequest(const std::string& request_id) const;
   const ServedPrediction* FindPredictionOfRequest(const std::string& request_id) const;
 

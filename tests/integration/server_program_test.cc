@@ -182,7 +182,7 @@ TEST_F(ServerProgramTest, AStreamThatDoesNotEndIsCutAtTheDrainDeadline) {
   EXPECT_EQ(process_->WaitForExit(kPatience), 0);
 }
 
-// A connection to 127.0.0.1:PORT; -1 when nobody listens there.
+// A connection to 127.0.0.1:PORT; -1 when no process listens there.
 int ConnectTo(const std::string& host_and_port) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -263,7 +263,7 @@ TEST_F(ServerProgramTest, ATakenPortOrFolderIsOneLineAndTheEnd) {
   EXPECT_THAT(TissueformClient::Connect(holder->address(), {}), IsOk());
 }
 
-// gRPC 1.51 by itself is deaf for ever after this (CVE-2023-4785).
+// gRPC 1.51 by itself never accepts a connection again after this (CVE-2023-4785).
 TEST(ServerFloodTest, AFloodOfConnectionsLeavesAServerThatAnswersAndADragThatGoesOn) {
   auto process = ServerProcess::Start("/usr/bin/prlimit",
                                       {"--nofile=256:256", ProgramPath("tissueform-server"),

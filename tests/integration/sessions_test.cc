@@ -85,7 +85,7 @@ TEST_F(SessionsTest, CancelledCreationsLeaveNothingBehind) {
   ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh, client->UploadMesh(problem.mesh, problem.CellArrays()));
   const int64_t mesh_bytes = server().memory_budget().reserved_bytes();
   const auto stub = v1::SessionService::NewStub(OwnChannel());
-  // Deadlines from "at once" to "after it is done": whatever the moment, nothing may be left. Only
+  // Deadlines from "at once" to "after it is done": at no moment may anything be left. Only
   // an answer that was on its way when the client gave up leaves a session, which the client finds
   // again by its request id.
   SessionRequest request = problem.Request(mesh.name());

@@ -22,7 +22,7 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_authority.h"
 
-// The server behind TLS: its certificates rotate, and nobody without the right ones gets in.
+// The server behind TLS: its certificates rotate, and clients without the right ones are refused.
 namespace tissueform::testing {
 namespace {
 

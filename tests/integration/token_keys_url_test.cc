@@ -20,7 +20,7 @@
 #include "tests/testing/test_paths.h"
 #include "tests/testing/test_tokens.h"
 
-// Keys from a web server that nobody here wrote.
+// Keys from a web server of another project.
 namespace tissueform::testing {
 namespace {
 

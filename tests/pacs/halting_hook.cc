@@ -3,8 +3,8 @@
 
 // Linked to tissueform-pacs this is tissueform-pacs-halting: the bridge as it is, but it stops
 // (SIGSTOP) at a fault point that a test wants, so that the test may kill a program exactly there.
-// In the folder TISSUEFORM_HALT_DIR the file `want` names the point; whoever passes it renames the
-// file to `reached`, and the bridge stops until SIGCONT.
+// In the folder TISSUEFORM_HALT_DIR the file `want` names the point; the thread that passes it
+// renames the file to `reached`, and the bridge stops until SIGCONT.
 
 #include <csignal>
 #include <cstdio>

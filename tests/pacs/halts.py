@@ -41,6 +41,6 @@ class Halts:
         if "bridge" in victims:
             self.programs.start_bridge(wait=then is None)  # it may stand there before it listens
             return
-        bridge.send_signal(signal.SIGCONT)  # its connections are broken, and nobody answers yet
+        bridge.send_signal(signal.SIGCONT)  # its connections are broken, and no server answers yet
         self.programs.start_server()
         self.programs.start_orthanc()

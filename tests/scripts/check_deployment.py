@@ -108,7 +108,7 @@ def check_configuration(programs, scratch):
 
 
 def main(programs):
-    logrotate = shutil.which("logrotate", path="/usr/sbin:/usr/bin:/sbin")  # sbin is not in everybody's path
+    logrotate = shutil.which("logrotate", path="/usr/sbin:/usr/bin:/sbin")  # sbin is not in every user's path
     if not shutil.which("systemd-analyze") or not logrotate:
         print("systemd or logrotate is not installed", file=sys.stderr)
         return SKIPPED

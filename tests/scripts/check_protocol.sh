@@ -26,7 +26,7 @@ fi
 "$buf" lint
 "$buf" breaking --path tissueform/v1 --against "$released"
 
-# Above every rpc: "Open to: ..." and a code, or that there is none.
+# Above every rpc: "Open to: ..." and a code, or "No error of its own".
 awk '
   /^ *\/\// { comment = comment $0 "\n"; next }
   /^ *rpc / {

@@ -36,8 +36,8 @@ case ${1:-} in
       chosen=$all
     else
       chosen=$(tests/scripts/tidy_selection.py select "$passed")
-      # It asks of every function, those of the libraries' headers too, what becomes of its parameters. Whoever changes a
-      # file has it checked by the short run.
+      # It asks of every function, those of the libraries' headers too, what becomes of its parameters. A developer's changed
+      # files are checked for it by the short run.
       if [[ $chosen == "$all" ]]; then
         checks=-performance-unnecessary-value-param
         echo "NOT run: ${checks#-} of clang-tidy, which takes a quarter of its time over all files; by hand: $0 --all"

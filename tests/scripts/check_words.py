@@ -5,7 +5,7 @@
 
     tests/scripts/check_words.py [--root DIR] [--table FILE] [FILE...]
 
-Texts are Markdown, string literals of C++, TypeScript and Python, and the comments of public headers and .proto files; the
+Texts are Markdown, string literals of C++, TypeScript and Python, and comments; the
 table says of which files. Exit code 0 when nothing is found, 1 otherwise, 2 for wrong use.
 """
 
@@ -60,10 +60,11 @@ def literals_of(text):
                     yield number, found
 
 
-def comments_of(text):
+def comments_of(text, mark):
+    """(line, text) of each comment: after `mark`, or a line that begins with an asterisk."""
     for number, line in enumerate(text.splitlines(), start=1):
-        if match := re.search(r"(?:^|\s)//+<?\s?(.*)", line):
-            yield number, match.group(1)
+        if match := re.search(rf"^\s*/?\*+\s(?P<block>.*)|(?:^|\s){mark}\s?(?P<line>.*)", line):
+            yield number, match["block"] or match["line"] or ""
 
 
 def word_errors(table, lines):
@@ -111,8 +112,8 @@ def errors_of(table, path, text):
             errors += sentence_errors(table, prose)
     elif path.endswith((".cc", ".h", ".ts", ".py")) and table.covers("literals", path):
         errors += word_errors(table, literals_of(text))
-    if path.endswith((".h", ".proto")) and table.covers("comments", path):
-        errors += word_errors(table, comments_of(text))
+    if not path.endswith(".md") and table.covers("comments", path):
+        errors += word_errors(table, comments_of(text, "#+" if path.endswith((".py", ".sh")) else "//+<?"))
     return errors
 
 
@@ -132,7 +133,7 @@ def main():
     count = 0
     for path in files:
         file = arguments.root / path
-        if path.endswith((".md", ".cc", ".h", ".ts", ".py", ".proto")) and file.is_file():
+        if path.endswith((".md", ".cc", ".h", ".ts", ".py", ".proto", ".sh", ".mjs")) and file.is_file():
             for number, error in errors_of(table, path, file.read_text(encoding="utf-8")):
                 print(f"{path}:{number}: {error}", file=sys.stderr)
                 count += 1

@@ -11,7 +11,7 @@ TABLE = check_words.Table("""
 max_sentence_words = 6
 markdown = ["*.md"]
 literals = ["server/*"]
-comments = ["*.proto"]
+comments = ["*.proto", "core/*"]
 [words]
 "anew" = "again"
 "(?:is|are) told" = "is reported"
@@ -48,6 +48,11 @@ class CheckWordsTest(unittest.TestCase):
 
     def test_finds_words_in_comments_of_the_protocol(self):
         self.assertEqual(self.errors("a.proto", "// What is told.\nstring anew = 1;\n"), [(1, '"is told": write is reported')])
+
+    def test_finds_words_in_comments_of_code(self):
+        self.assertEqual(self.errors("core/a.cc", "int a;  // anew\nint anew;\n"), [(1, '"anew": write again')])
+        self.assertEqual(self.errors("core/a.ts", "/**\n * What is told.\n */\nconst b = a * anew;\n"), [(2, '"is told": write is reported')])
+        self.assertEqual(self.errors("core/a.py", "anew = 1\n# anew\n"), [(2, '"anew": write again')])
 
 
 if __name__ == "__main__":

@@ -170,7 +170,7 @@ def main():
         add(path, batch.arguments())
         lines.append(f"{path}\t{' '.join(str(file) for file in batch.files)}")
     (folder / "compile_commands.json").write_text(json.dumps(database), encoding="utf-8")
-    # Not before: whoever reads the lines begins at once.
+    # Not before: the program that reads the lines begins at once.
     print(*lines, sep="\n")
 
 

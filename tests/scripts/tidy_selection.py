@@ -21,7 +21,7 @@ import re
 import subprocess
 import sys
 
-# Whatever says how files are compiled or checked, or makes sources of its own.
+# Files that say how others are compiled or checked, or that generate sources.
 CONCERNS_ALL = re.compile(
     r"(^|/)(CMakeLists\.txt|CMakePresets\.json|\.clang-tidy)$|\.(cmake|proto|in)$|\.schema\.json$"
     r"|^cmake/|^deploy/packages\.txt$|^tests/scripts/(check_tidy\.sh|tidy_batches\.py|tidy_selection\.py)$"

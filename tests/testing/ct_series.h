@@ -13,7 +13,7 @@
 namespace tissueform::testing {
 
 struct CtSeriesOptions {
-  // The patient; "\n" in none of them. Bytes are written as they are, whatever the character set.
+  // The patient; "\n" in none of them. Bytes are written as they are, for any character set.
   std::string patient_name = "Planted^Patricia^Q";
   std::string patient_id = "PLANTED-4711";
   std::string issuer_of_patient_id = "Planted Hospital";

@@ -35,8 +35,8 @@ void FakeCallState::Finish(grpc::Status status) {
   {
     MutexLock lock(mutex_);
     ++reactions_under_way_;
-    // What the client sees: its own cancellation, whatever the server says after it. A read that
-    // fails before OnCancel looks to a reactor like the end of sending, and it may end well.
+    // What the client sees: its own cancellation, even if the server says something else later. A
+    // read that fails before OnCancel looks to a reactor like the end of sending, and may end well.
     status_ = cancelled_ ? grpc::Status(grpc::StatusCode::CANCELLED, "cancelled by the client")
                          : std::move(status);
   }

@@ -14,7 +14,7 @@
 namespace tissueform::testing {
 
 // What an HTTP server on this machine answers to GET, head and all, until it closes; empty when
-// nobody listens there.
+// no process listens there.
 inline std::string HttpGet(int port, const std::string& path,
                            const std::string& host = "127.0.0.1") {
   const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);

@@ -8,7 +8,7 @@
 
 namespace tissueform::testing {
 
-// Who may what on a server where nobody logs in: everybody everything.
+// Access on a server without logins: every caller may do everything.
 struct NoLogins {
   InMemoryAccessStore store;
   AccessQueries queries{store.database()};

@@ -28,7 +28,7 @@ class SharedSessions {
   static constexpr int kLeaseSeconds = 10;
 
   struct Lease {
-    std::string node = "";  // empty: nobody's
+    std::string node = "";  // empty: no holder
     int64_t epoch = 0;
     int until = 0;
   };
@@ -41,7 +41,7 @@ class SharedSessions {
     MutexLock lock(mutex_);
     return now_;
   }
-  // What is kept of a session; nothing when there is none.
+  // What is kept of a session; nothing if it does not exist.
   std::optional<Lease> Find(const std::string& id) const {
     MutexLock lock(mutex_);
     const auto found = leases_.find(id);
@@ -62,7 +62,7 @@ class SharedSessions {
   friend class FakeOwnership;
   friend class SharedSessionStore;
 
-  // Greater than every one before, of whatever session.
+  // Greater than every one before, of any session.
   int64_t NextEpoch() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return ++newest_epoch_; }
 
   mutable Mutex mutex_;
@@ -146,7 +146,7 @@ class FakeOwnership final : public SessionOwnership {
     return lost;
   }
 
-  // What may not be answered any longer, without asking the store.
+  // What may no longer be answered, without asking the store.
   std::vector<std::string> TakeEnded() {
     std::vector<std::string> ended;
     MutexLock lock(shared_.mutex_);
@@ -302,7 +302,7 @@ class SharedSessionStore final : public SessionStore {
     return [result](Result answer) { *result = std::move(answer); };
   }
 
-  // One write, between which and the look at its epoch nobody takes the session.
+  // One write; no server takes the session between the look at its epoch and the write.
   absl::Status Write(const std::string& id, int64_t epoch,
                      const std::function<absl::Status()>& write, bool is_last = false) {
     MutexLock lock(shared_.mutex_);

@@ -36,7 +36,7 @@ MATCHER_P2(StatusIs, code, message_matcher, "") {
 // What most refusals are.
 inline constexpr absl::StatusCode kInvalid = absl::StatusCode::kInvalidArgument;
 
-// Whatever the message.
+// With any message.
 inline auto StatusIs(absl::StatusCode code) { return StatusIs(code, ::testing::_); }
 
 // ASSERT_OK_AND_ASSIGN(const TetMesh mesh, TetMesh::Create(...));

@@ -61,7 +61,7 @@ TlsCollector::TlsCollector(const Options& options)
   address.sin_port = htons(static_cast<uint16_t>(options.port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   socklen_t size = sizeof(address);
-  // The port of an earlier collector may be somebody's for a moment.
+  // The port of an earlier collector may be in use for a moment.
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (bind(listener_, reinterpret_cast<sockaddr*>(&address), size) != 0) {
     Require(std::chrono::steady_clock::now() < end);

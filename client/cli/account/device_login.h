@@ -27,7 +27,7 @@ struct LoginTokens {
   std::chrono::seconds lifetime{0};  // 0: not told
 };
 
-// What the user is told: where to go, and what to enter there.
+// What the user gets to see: where to go, and what to enter there.
 struct DevicePrompt {
   std::string url;
   std::string user_code;
@@ -43,11 +43,11 @@ class DeviceLogin {
   using Wait = std::function<void(std::chrono::seconds)>;
   DeviceLogin(LoginClient client, LoginExchange exchange, Wait wait);
 
-  // Shows the user the way by `prompt`, and waits until they have gone it.
+  // Shows `prompt` to the user, and waits until the user has completed the login.
   //
-  // Errors: InvalidArgument (issuer), Unavailable (nobody answers), FailedPrecondition (the
-  // provider has no device flow), PermissionDenied (it, or the user, has refused), DeadlineExceeded
-  // (the code has expired), DataLoss (an answer that is none).
+  // Errors: InvalidArgument (issuer), Unavailable (the provider does not answer),
+  // FailedPrecondition (it has no device flow), PermissionDenied (it, or the user, has refused),
+  // DeadlineExceeded (the code has expired), DataLoss (an invalid answer).
   absl::StatusOr<LoginTokens> Run(const std::function<void(const DevicePrompt&)>& prompt);
 
   // Another token for `refresh_token`; its own refresh token is `refresh_token` where none came.

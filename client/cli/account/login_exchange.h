@@ -19,12 +19,12 @@ struct LoginRequest {
   HttpForm form = {};
 };
 
-// Makes a request and waits for its answer, whatever its status. Errors: Unavailable, with the
+// Makes a request and waits for its answer, of any HTTP status. Errors: Unavailable, with the
 // host's name and the cause.
 using LoginExchange = std::function<absl::StatusOr<HttpAnswer>(const LoginRequest& request)>;
 
 // Over the network, by the proxy that the environment names: follows no redirect, takes 256 KiB at
-// most, ends within 30 s. The system's certificates decide whom to trust. REQUIRES: CheckLoginUrl.
+// most, ends within 30 s. Trusts the system's certificate authorities. REQUIRES: CheckLoginUrl.
 absl::StatusOr<HttpAnswer> AskProvider(const LoginRequest& request);
 
 // That `url` is one to which secrets may go: https, or http of this machine; without a password,

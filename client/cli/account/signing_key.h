@@ -12,7 +12,7 @@
 
 namespace tissueform {
 
-// A private key that signs tokens: of P-256 (ES256), or RSA (RS256). Whoever has it can be anybody.
+// A private key that signs tokens: of P-256 (ES256), or RSA (RS256). Its owner can act as any user.
 class SigningKey {
  public:
   ~SigningKey();
@@ -27,7 +27,7 @@ class SigningKey {
 
   std::string PrivatePem() const;  // PKCS #8, without a password
   std::string PublicPem() const;
-  // {"keys": [...]}: what servers are told.
+  // {"keys": [...]}: the public keys, for the servers' configuration.
   nlohmann::json PublicJwks() const;
 
   // "ES256" or "RS256".

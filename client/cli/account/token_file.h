@@ -20,13 +20,13 @@ struct KeptLogin {
   std::string refresh_token;
 };
 
-// Makes the folder (0700) where there is none. Without a refresh token no FILE.renewal is left.
+// Creates the folder (0700) if it is missing. Without a refresh token no FILE.renewal is left.
 //
 // Errors: as WriteFileAtomically.
 absl::Status KeepLogin(const std::string& path, const LoginClient& client,
                        const LoginTokens& tokens);
 
-// Errors: NotFound (nobody has logged in, or what the provider gave cannot be renewed),
+// Errors: NotFound (no user has logged in, or the provider's tokens cannot be renewed),
 // FailedPrecondition (others may read the file), DataLoss (it is damaged).
 absl::StatusOr<KeptLogin> ReadLogin(const std::string& path);
 

@@ -7,7 +7,7 @@
 
 namespace tissueform {
 
-// `tissueform whoami`: whom a server takes one for.
+// `tissueform whoami`: which identity a server sees.
 void AddWhoamiCommand(CLI::App& app, CommandWork* work);
 
 }  // namespace tissueform

@@ -36,8 +36,8 @@ struct PackedCase {
 absl::StatusOr<PackedCase> PackPlan(const std::string& plan_path, const PlanReadOptions& reading,
                                     const std::string& title);
 
-// Gives a server the case and first the mesh in it, so that whoever sees the case can open it.
-// Lines about what takes long go to stderr. Errors: those of TissueformClient.
+// Uploads to a server first the mesh of the case and then the case, so that users who see the case
+// can open it. Prints lines about long steps to stderr. Errors: those of TissueformClient.
 absl::StatusOr<v1::Case> PublishCase(TissueformClient* client, const CaseFile& contents,
                                      const std::string& bytes, const std::string& title);
 

@@ -23,7 +23,7 @@ namespace tissueform {
 absl::StatusOr<CaseFile> CaseOfPlan(const PlanProblem& problem, CaseFile about,
                                     std::optional<ViewerFile> viewer);
 
-// "mandible" in words for people: "Lower jaw"; a name that is none of ours stays.
+// The label of "mandible" for users: "Lower jaw"; an unknown name is returned unchanged.
 std::string LabelOf(const std::string& name);
 
 }  // namespace tissueform

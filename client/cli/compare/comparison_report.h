@@ -37,7 +37,7 @@ struct CompareOptions {
 
 // How far two results lie apart, by regions, as that command tells it.
 
-// Vertices that are told of together.
+// Vertices that the report treats as one region.
 struct ComparedRegion {
   std::string name;  // "all", "skin", "anatomy = 2", "handle chin"
   std::vector<int32_t> vertices;

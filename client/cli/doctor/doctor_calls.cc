@@ -102,7 +102,7 @@ DoctorLine FailedCall(const std::string& check, const std::string& what,
       .advice = AdviceFor(status)};
 }
 
-// Far from every other mesh, so that it is nobody else's.
+// With a random offset of the last vertex, so that other users do not have the same mesh.
 absl::StatusOr<TetMesh> TwoTets() {
   std::random_device random;
   const double shift = static_cast<double>(random() % 1'000'000) * 1e-6;

@@ -22,17 +22,17 @@ class DoctorCalls {
 
   // Whether the health service says SERVING.
   DoctorLine CheckHealth() const;
-  // Whom the server takes the caller for, and how far the clocks are apart: two lines. False: it
-  // knows the caller by nothing, and all other calls would fail the same way.
+  // Which identity the server sees, and how far the clocks are apart: two lines. False: the server
+  // does not recognize the caller, and all other calls would fail the same way.
   bool CheckCaller(DoctorReport* report) const;
   // Versions of both sides, and what the server takes: two lines.
   void CheckServer(DoctorReport* report);
-  // A mesh of two tets is uploaded, made a session, dragged, and deleted; in a cluster (CheckServer
-  // hears of it) at the server that has the session, and again where one is lost meanwhile.
+  // Uploads a mesh of two tets, makes a session of it, drags it and deletes both; in a cluster
+  // (known from CheckServer) at the server that has the session, and again if a session is lost.
   DoctorLine CheckWork();
 
  private:
-  // Deletes both, whatever there is of them.
+  // Deletes both, as far as they exist.
   void Delete(const std::string& mesh, const std::string& session);
 
   const std::shared_ptr<grpc::Channel> channel_;

@@ -32,7 +32,7 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr absl::string_view kPreface("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0", 33);
 constexpr size_t kMaxAddresses = 8;
 
-// Null and `error` set when there is none.
+// Null, with `error` set, if the host name does not resolve.
 Addresses Resolve(const ServerEndpoint& endpoint, std::string* error) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;

@@ -42,7 +42,7 @@ class ProbeSocket {
 
 // Whether the name is one: what the line says are its addresses.
 DoctorLine CheckName(const ServerEndpoint& endpoint);
-// Whether somebody takes connections there.
+// Whether a program accepts connections there.
 DoctorLine CheckRoute(const ServerEndpoint& endpoint);
 // Errors: Unavailable.
 absl::StatusOr<ProbeSocket> ConnectProbe(const ServerEndpoint& endpoint);

@@ -26,7 +26,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-// Fewer, and whoever runs the server should know.
+// With fewer days left, the server's operator gets a warning.
 constexpr int kFewDays = 14;
 // As ALPN names them.
 constexpr char kHttp2[] = "h2";

@@ -11,9 +11,9 @@
 
 namespace tissueform {
 
-// What the token of the options says of itself: whose it is and how long it lasts. Whether it is
-// good only a server can tell; nothing of its signature is looked at, and nothing of it but claims
-// is told.
+// What the token of the options says of itself: whose it is and how long it lasts. Only a server
+// can tell whether it is valid; this check does not verify its signature, and prints only claims of
+// the token.
 DoctorLine CheckToken(const ConnectionOptions& options, std::chrono::system_clock::time_point now);
 
 }  // namespace tissueform

@@ -23,7 +23,7 @@ struct ExportedFaceOptions {
 // made here as a server makes them; of an elastic model with the band of uncertainty where the plan
 // gives ranges of the material. Takes what preparing that model takes.
 //
-// Errors: InvalidArgument (a model or a segment that is none; a model without prepared answers);
+// Errors: InvalidArgument (an unknown model or segment; a model without prepared answers);
 // FailedPrecondition (the plan's own poses lie beyond the model's prepared answers); those of
 // MeshPreparation, CreateResponse and BandColumns.
 absl::StatusOr<MovingData> ExportFace(OpenedPlan opened, const ExportedFaceOptions& options);

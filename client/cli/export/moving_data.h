@@ -13,7 +13,7 @@ namespace tissueform {
 // What a file that moves holds before it is compressed (docs/moving-file.md). No name, date or
 // identifier: of a case only what is here is taken.
 struct MovingData {
-  std::string title = {};     // empty unless somebody asked for one
+  std::string title = {};     // empty unless the user gave one
   std::string software = {};  // "tissueform 0.2.0"
   std::string model = {};     // by its name in plans
   HeadFrame head_frame = {};

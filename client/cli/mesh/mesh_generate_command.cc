@@ -41,7 +41,7 @@ struct MeshGenerateOptions {
   bool json = false;
 };
 
-// "1,2,3" as numbers; empty when one is none.
+// "1,2,3" as numbers; empty when a part is not a number.
 std::vector<double> Numbers(const std::string& text) {
   std::vector<double> numbers;
   for (const absl::string_view part : absl::StrSplit(text, ',')) {

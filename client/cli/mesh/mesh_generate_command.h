@@ -7,8 +7,8 @@
 
 namespace tissueform {
 
-// `mesh generate SURFACE --out MESH.vtu [...]`: tets in a closed surface, or the reason why there
-// are none, with a file to look at. Added to the command `mesh`.
+// `mesh generate SURFACE --out MESH.vtu [...]`: tets in a closed surface, or the reason why meshing
+// failed, with a file to look at. Added to the command `mesh`.
 void AddMeshGenerateCommand(CLI::App& mesh, CommandWork* work);
 
 }  // namespace tissueform

@@ -107,6 +107,9 @@ CLI::App* AddCohortCommand(CLI::App* outcome, CommandWork* work) {
       ->check(CLI::IsMember(KnownModelNames()));
   command->add_flag("--accept-findings", options->accept_findings,
                     "compare in spite of an open mouth or swelling");
+  command->add_flag("--calibrate", options->calibrate,
+                    "choose settings of linear_elastic by leave-one-out cross-validation; takes "
+                    "some minutes a patient");
   command->add_flag("--no-pictures", options->no_pictures,
                     "reports without pictures: needs no display and no Xvfb");
   command->footer(kFooter);

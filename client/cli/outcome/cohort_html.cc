@@ -56,15 +56,16 @@ Json DistanceRow(const Json& row) {
           {"signed mean_mm", Fixed(row["bias_mm"])}};
 }
 
+std::string PText(double p) { return p < 0.0001 ? "< 0.0001" : absl::StrFormat("%.4f", p); }
+
 Json PairRow(const Json& row) {
-  const double p = row["p"];
   return {{"region", Words(row["region"])},
           {"model", ModelName(row["model"])},
           {"against", ModelName(row["other"])},
           {"n", row["n"]},
           {"mean difference_mm", Fixed(row["mean_difference_mm"])},
           {"median difference_mm", Fixed(row["median_difference_mm"])},
-          {"p", p < 0.0001 ? "< 0.0001" : absl::StrFormat("%.4f", p)},
+          {"p", PText(row["p"])},
           {"computed", row["exact"].get<bool>() ? "exact" : "normal approximation"}};
 }
 
@@ -119,6 +120,49 @@ std::string PairSections(const Json& json) {
                        "number.</p>\n",
                        TableOf(json["paired_tests"], operation, movement, PairRow)));
     }
+  }
+  return html;
+}
+
+std::string SettingsText(const Json& settings) {
+  const std::string vestibule =
+      settings["vestibule_mm"].is_null()
+          ? "vestibule as planned"
+          : absl::StrFormat("vestibule %.0f mm", settings["vestibule_mm"].get<double>());
+  return absl::StrFormat("stiffness contrast %.1f, %s, seal %s",
+                         settings["stiffness_contrast"].get<double>(), vestibule,
+                         settings["seal"].get<bool>() ? "on" : "off");
+}
+
+std::string CalibrationTables(const Json& calibration) {
+  Json regions = Json::array();
+  for (const Json& row : calibration["regions"]) {
+    regions.push_back({{"region", Words(row["region"])},
+                       {"patients", row["pairs"]},
+                       {"plan's settings_mm", Fixed(row["plan_mean_mm"])},
+                       {"calibrated_mm", Fixed(row["calibrated_mean_mm"])},
+                       {"mean difference_mm", Fixed(row["mean_difference_mm"])},
+                       {"p", PText(row["p"])}});
+  }
+  Json chosen = Json::array();
+  for (const Json& row : calibration["chosen"]) {
+    chosen.push_back({{"settings", SettingsText(row["settings"])}, {"patients", row["cases"]}});
+  }
+  return absl::StrCat("<p>For each patient linear_elastic gets the settings, of ",
+                      calibration["settings_tried"].get<int>(),
+                      ", that were best for all other patients (leave-one-out): no patient's error "
+                      "is fitted and reported at once. A negative difference: calibration is "
+                      "nearer. Best of all patients, for the next one: ",
+                      SettingsText(calibration["next_patient"]), ".</p>\n", JsonColumns(regions),
+                      JsonColumns(chosen));
+}
+
+std::string CalibrationSections(const Json& json) {
+  std::string html;
+  for (const Json& calibration : json["calibration"]) {
+    html += HtmlFolded(absl::StrCat("Calibration, ", calibration["operation"].get<std::string>(),
+                                    ", ", MovementText(calibration["movement"])),
+                       CalibrationTables(calibration));
   }
   return html;
 }
@@ -228,7 +272,7 @@ std::string CohortHtml(const CohortResults& results, const Json& json) {
                   absl::StrCat("<p>Share of patients whose mean absolute distance is at most x; "
                                "predicted from the real movement.</p>\n",
                                CumulativePlots(results))),
-      PairSections(json), AgreementSections(results, json));
+      PairSections(json), CalibrationSections(json), AgreementSections(results, json));
   if (!json["segment_deviations"].empty()) {
     html += HtmlFolded("Deviations of the segments from the plan (mm, degrees)",
                        JsonColumns(json["segment_deviations"]));

@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "client/cli/outcome/cohort_results.h"
+#include "client/cli/outcome/cohort_tables.h"
 #include "core/base/software_version.h"
 #include "core/planning/outcome/cohort_statistics.h"
 
@@ -23,8 +24,6 @@ using Json = nlohmann::ordered_json;
 constexpr char kTogether[] = "all operations";
 constexpr char kBaseline[] = "none";
 
-double Rounded(double value) { return std::round(value * 1000) / 1000; }
-
 // Values with their names in the order of first appearance, as models and regions are listed in
 // each case.
 template <typename Rows, typename NameOf>
@@ -35,20 +34,6 @@ std::vector<std::string> NamesIn(const Rows& rows, const NameOf& name_of) {
     if (std::ranges::find(names, name) == names.end()) names.push_back(name);
   }
   return names;
-}
-
-// All together first, then each operation; only together where there is one.
-std::vector<std::string> OperationsOf(const CohortResults& results) {
-  std::map<std::string, int> counts;
-  for (const CohortCase& row : results.compared) ++counts[row.operation];
-  std::vector<std::string> names = {kTogether};
-  if (counts.size() < 2) return names;
-  for (const auto& [name, count] : counts) names.push_back(name);
-  return names;
-}
-
-bool IsOf(const std::string& operation, const std::string& group) {
-  return group == kTogether || group == operation;
 }
 
 // The distances of one group and region, by case.
@@ -112,18 +97,6 @@ std::vector<double> PairedDifferences(const ByCase& ours, const ByCase& theirs) 
         Rounded(distance->skin.mean_absolute_mm - other->second->skin.mean_absolute_mm));
   }
   return differences;
-}
-
-Json PairJson(const std::vector<double>& differences) {
-  const SignedRankTest test = TestSignedRanks(differences);
-  const CohortSummary found = SummarizeCohort(differences);
-  return {{"pairs", differences.size()},
-          {"mean_difference_mm", Rounded(found.mean_mm)},
-          {"median_difference_mm", Rounded(found.median_mm)},
-          {"n", test.n},
-          {"rank_sum", test.rank_sum},
-          {"p", test.p},
-          {"exact", test.exact}};
 }
 
 struct CohortTables {
@@ -262,6 +235,33 @@ Json RefusedJson(const CohortResults& results) {
 
 }  // namespace
 
+double Rounded(double value) { return std::round(value * 1000) / 1000; }
+
+std::vector<std::string> OperationsOf(const CohortResults& results) {
+  std::map<std::string, int> counts;
+  for (const CohortCase& row : results.compared) ++counts[row.operation];
+  std::vector<std::string> names = {kTogether};
+  if (counts.size() < 2) return names;
+  for (const auto& [name, count] : counts) names.push_back(name);
+  return names;
+}
+
+bool IsOf(const std::string& operation, const std::string& group) {
+  return group == kTogether || group == operation;
+}
+
+Json PairJson(const std::vector<double>& differences) {
+  const SignedRankTest test = TestSignedRanks(differences);
+  const CohortSummary found = SummarizeCohort(differences);
+  return {{"pairs", differences.size()},
+          {"mean_difference_mm", Rounded(found.mean_mm)},
+          {"median_difference_mm", Rounded(found.median_mm)},
+          {"n", test.n},
+          {"rank_sum", test.rank_sum},
+          {"p", test.p},
+          {"exact", test.exact}};
+}
+
 Json CohortJson(const CohortResults& results) {
   const CohortTables tables = TablesOf(results);
   return {{"format", "tissueform-cohort"},
@@ -273,7 +273,8 @@ Json CohortJson(const CohortResults& results) {
           {"distances", tables.distances},
           {"paired_tests", tables.pairs},
           {"landmarks", LandmarksJson(results)},
-          {"segment_deviations", DeviationsJson(results)}};
+          {"segment_deviations", DeviationsJson(results)},
+          {"calibration", CalibrationJson(results)}};
 }
 
 }  // namespace tissueform

@@ -64,6 +64,20 @@ void AddDeviations(const CohortCase& row, const Json& segments, CohortResults* r
   }
 }
 
+void AddSettings(const CohortCase& row, const Json& by_settings, CohortResults* results) {
+  for (const Json& prediction : by_settings) {
+    const std::string settings = prediction.at("settings").dump();
+    for (const Json& region : prediction.at("regions")) {
+      results->settings.push_back({.id = row.id,
+                                   .operation = row.operation,
+                                   .movement = prediction.at("movement"),
+                                   .settings = settings,
+                                   .region = region.at("region"),
+                                   .mean_absolute_mm = region.at("mean_absolute_mm")});
+    }
+  }
+}
+
 absl::Status AddCase(const CohortCase& row, const Json& outcome, CohortResults* results) {
   try {
     for (const Json& prediction : outcome.at("predictions")) {
@@ -74,6 +88,7 @@ absl::Status AddCase(const CohortCase& row, const Json& outcome, CohortResults* 
       AddLandmarks(group, prediction.at("landmarks"), results);
     }
     AddDeviations(row, outcome.at("segments"), results);
+    AddSettings(row, outcome.value("by_settings", Json::array()), results);
     return absl::OkStatus();
   } catch (const Json::exception&) {
     return absl::DataLossError(

@@ -49,6 +49,16 @@ struct CohortDeviation {
   double value = 0;
 };
 
+// The error of one region of one case with one setting of the model.
+struct CohortSetting {
+  std::string id;
+  std::string operation;
+  std::string movement;
+  std::string settings;  // their JSON, by which they are equal
+  std::string region;
+  double mean_absolute_mm = 0;
+};
+
 struct CohortRefusal {
   std::string id;
   std::string operation;
@@ -61,6 +71,7 @@ struct CohortResults {
   std::vector<CohortDistance> distances;
   std::vector<CohortLandmark> landmarks;
   std::vector<CohortDeviation> deviations;
+  std::vector<CohortSetting> settings;  // of cases that were compared with --calibrate
 };
 
 // Reads outcome.json of every case that has a result; `runs` are those of the cases. Errors: those

@@ -115,6 +115,7 @@ std::vector<std::string> OptionsOfOutcome(const CohortOptions& options) {
     words.insert(words.end(), {"--model", model});
   }
   if (options.accept_findings) words.emplace_back("--accept-findings");
+  if (options.calibrate) words.emplace_back("--calibrate");
   if (options.no_pictures) words.emplace_back("--no-pictures");
   return words;
 }

@@ -18,6 +18,7 @@ struct CohortOptions {
   double memory_gib = 0;  // of all processes together; 0: three quarters of this machine's
   std::vector<std::string> models;
   bool accept_findings = false;
+  bool calibrate = false;
   bool no_pictures = false;
 };
 

@@ -40,6 +40,7 @@ struct OutcomeArguments {
   std::string out;
   std::vector<std::string> models;
   bool accept_findings = false;
+  bool calibrate = false;
   bool no_pictures = false;
 };
 
@@ -80,6 +81,7 @@ absl::StatusOr<Outcome> Compare(const OutcomeArguments& arguments, const PreOper
   options.models = models;
   options.threads = arguments.post.threads;
   options.accept_findings = arguments.accept_findings;
+  options.settings = arguments.calibrate;
   options.tell = [&progress](absl::string_view stage) {
     progress.reset();
     progress.emplace(std::string(stage));
@@ -194,6 +196,9 @@ void AddOutcomeCommand(CLI::App& app, CommandWork* work) {
       ->check(CLI::Range(0, 1024));
   command->add_flag("--accept-findings", arguments->accept_findings,
                     "compare in spite of an open mouth or swelling; the report states it");
+  command->add_flag("--calibrate", arguments->calibrate,
+                    "predict with other settings of linear_elastic, too: how much tissues differ, "
+                    "vestibule, seal; a cohort is calibrated by them");
   command->add_flag("--no-pictures", arguments->no_pictures,
                     "report without pictures: needs no display and no Xvfb");
   command->footer(kFooter);

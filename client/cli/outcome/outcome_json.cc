@@ -102,6 +102,26 @@ Json PredictionsJson(const Outcome& outcome) {
   return list;
 }
 
+Json BySettingsJson(const Outcome& outcome) {
+  Json list = Json::array();
+  for (const SettingsComparison& comparison : outcome.by_settings) {
+    Json regions = Json::array();
+    for (const RegionComparison& region : comparison.regions) {
+      regions.push_back({{"region", region.region},
+                         {"mean_absolute_mm", Rounded(region.predicted_to_real.mean_absolute_mm)}});
+    }
+    const ModelSettings& settings = comparison.settings;
+    list.push_back(
+        {{"settings",
+          {{"stiffness_contrast", settings.stiffness_contrast},
+           {"vestibule_mm", settings.vestibule_mm ? Json(*settings.vestibule_mm) : Json(nullptr)},
+           {"seal", settings.seal}}},
+         {"movement", outcome.predictions.front().movement},
+         {"regions", regions}});
+  }
+  return list;
+}
+
 }  // namespace
 
 Json OutcomeJson(const Outcome& outcome, const HeadFrame& frame) {
@@ -120,6 +140,7 @@ Json OutcomeJson(const Outcome& outcome, const HeadFrame& frame) {
   json["mouth_opening_deg"] =
       outcome.opening ? Json(Rounded(outcome.opening->degrees)) : Json(nullptr);
   json["predictions"] = PredictionsJson(outcome);
+  if (!outcome.by_settings.empty()) json["by_settings"] = BySettingsJson(outcome);
   json["by_published_ratios"] = LandmarksJson(outcome.by_ratios);
   json["excess_ml"] = Rounded(outcome.excess_ml);
   json["cautions"] = outcome.cautions;

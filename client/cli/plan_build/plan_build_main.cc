@@ -129,7 +129,7 @@ absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& reque
   SetBlasThreads(1);
   std::unique_ptr<VirtualDisplay> display;
   if (request.pictures) {
-    // First, so that a missing program is told before the work.
+    // First, so that a missing program is reported before the work.
     TF_ASSIGN_OR_RETURN(display, VirtualDisplay::Open());
   }
   TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildFromInput(request, tell));

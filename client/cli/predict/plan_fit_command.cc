@@ -53,7 +53,7 @@ struct PlanFitOptions {
   bool json = false;
 };
 
-// A plan is somebody's work: unlike a result it is not replaced because its name was given again.
+// A plan is a user's work: unlike a result it is not replaced because its name was given again.
 absl::Status CheckOut(const PlanFitOptions& options) {
   if (!options.report.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.report));
   if (options.out.empty()) return absl::OkStatus();

@@ -220,8 +220,8 @@ void DrawPictures(const DemoOptions& options, const PlanProblem& problem,
 // How often it is looked whether the server has ended by itself.
 constexpr std::chrono::milliseconds kServeStep{200};
 
-// Until Ctrl-C, which is its regular end. Without the planner's pages, which a build without Node
-// has not, the server is served all the same.
+// Until Ctrl-C, which is its regular end. A build without Node does not have the planner's pages;
+// the server is then served without them.
 absl::Status Serve(const DemoOptions& options, const DemoCase& demo, ServerProcess* server) {
   const absl::StatusOr<OpenedPlanner> planner =
       options.open_planner(server->address(), demo.path, WebPort(options));

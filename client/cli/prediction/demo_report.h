@@ -52,7 +52,7 @@ absl::Status WriteSummaryJson(const std::string& path, const DemoDrags& drags,
 // For people, on stdout.
 void PrintDrags(const DemoDrags& drags);
 
-// What the numbers mean to somebody who plans operations, and the notice of every result.
+// What the numbers mean to a surgeon, and the notice of every result.
 void PrintInWords(const DemoDrags& drags, const DemoPrediction& prediction);
 
 }  // namespace tissueform

@@ -17,13 +17,13 @@
 namespace tissueform {
 
 // A tissueform-server or tissueform-gateway that this process has started. Ends with this object,
-// and with this process whatever ends it: SIGTERM, and SIGKILL when it has not ended in 30 s.
+// and with this process for any reason: SIGTERM, and SIGKILL when it has not ended in 30 s.
 class ServerProcess {
  public:
   // Starts `binary` with `arguments` and waits until it listens.
   //
-  // Errors, naming the program: NotFound (there is none), Unavailable (it ended, or did not listen
-  // in time).
+  // Errors, naming the program: NotFound (the program is missing), Unavailable (it ended, or did
+  // not listen in time).
   static absl::StatusOr<std::unique_ptr<ServerProcess>> Start(
       const std::string& binary, const std::vector<std::string>& arguments,
       std::chrono::milliseconds deadline);

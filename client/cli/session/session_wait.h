@@ -14,7 +14,7 @@
 #include "core/mechanics/problem/plan_problem.h"
 #include "tissueform/v1/session_service.pb.h"
 
-// Sessions for somebody who sits before a terminal.
+// Sessions for a user at a terminal.
 namespace tissueform {
 
 // PlanSession::Create; tells on stderr how far it is when that takes longer than a second. Ends

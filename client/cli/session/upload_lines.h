@@ -38,7 +38,7 @@ class UploadLines {
   bool told_ = false;
   absl::StatusCode interrupted_by_ = absl::StatusCode::kOk;
   double interrupted_s_ = 0;
-  std::string resumed_;  // the last line of it since an interruption was told
+  std::string resumed_;  // the last line of it since an interruption was reported
 };
 
 }  // namespace tissueform

@@ -9,7 +9,7 @@
 
 namespace tissueform {
 
-// `tissueform watch`: follows a session that somebody drags, a line a second.
+// `tissueform watch`: follows a session that a user drags, a line a second.
 void AddWatchCommand(CLI::App& app, CommandWork* work);
 
 }  // namespace tissueform

@@ -19,7 +19,7 @@ namespace tissueform {
 std::string ArraysText(const std::vector<Attribute>& attributes);
 nlohmann::ordered_json ArraysJson(const std::vector<Attribute>& attributes);
 
-// One line a defect, or one that says that there is none.
+// One line per defect, or one that says that the mesh has no defects.
 std::string DefectsText(const std::vector<MeshDefect>& defects);
 nlohmann::ordered_json DefectsJson(const std::vector<MeshDefect>& defects);
 

@@ -31,7 +31,7 @@ class StageProgress {
   const Stopwatch stopwatch_;
 
   Mutex mutex_;
-  std::string news_ ABSL_GUARDED_BY(mutex_);                // empty: nothing was told
+  std::string news_ ABSL_GUARDED_BY(mutex_);                // empty: no progress reported yet
   double printed_at_seconds_ ABSL_GUARDED_BY(mutex_) = -1;  // negative: not announced yet
 
   std::promise<void> ended_;

@@ -129,7 +129,7 @@ absl::Status DrawAccuracyCase(const AccuracyCase& problem, const AccuracyResult&
   for (const View& view : problem.views) {
     std::vector<Scene> row;
     for (const ModelVariant& variant : AllModelVariants()) {
-      if (variant.is_prepared) continue;  // not to be told from the model itself at this range
+      if (variant.is_prepared) continue;  // indistinguishable from the model itself at this range
       const ModelAnswer& model = *result.Model(variant.name);
       row.push_back(
           ModelScene(skin, model, PanelTitle(variant, model, reference, face), reference, view));

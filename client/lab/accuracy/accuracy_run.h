@@ -19,13 +19,13 @@ struct AccuracyResult {
   std::vector<ModelAnswer> references;  // CalculiX, linear and neo-Hookean; those that it found
   std::vector<ModelAnswer> models;      // in the order of AllModelVariants
 
-  // Null when there is none of that name.
+  // Null when no answer has that name.
   const ModelAnswer* Reference(const std::string& name) const;
   const ModelAnswer* Model(const std::string& name) const;
 };
 
 // Solves the case at every Poisson's ratio by every model and by CalculiX, in `folder`. A
-// reference that CalculiX does not find is told of and left out; a missing program is an error.
+// reference that CalculiX does not find is reported and left out; a missing program is an error.
 // `tell` gets a line for every step.
 absl::StatusOr<std::vector<AccuracyResult>> RunAccuracyCase(
     const AccuracyCase& problem, const std::vector<double>& poisson_ratios,

@@ -48,7 +48,7 @@ std::vector<SkinPlace> TableRegions(const AccuracyCase& problem) {
 
 std::string Seconds(double seconds) { return absl::StrFormat("%.3f", seconds); }
 
-// Mean and largest distance to the reference, or a dash where there is none.
+// Mean and largest distance to the reference, or a dash without a reference.
 std::string MeanAndMax(const ModelAnswer& model, const ModelAnswer* reference) {
   if (reference == nullptr) return "-";
   const DistanceSummary s = Summary(Distances(model.positions, reference->positions));

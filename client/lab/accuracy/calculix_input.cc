@@ -255,7 +255,7 @@ std::string CalculixInput(const CalculixProblem& problem) {
   if (!is_linear) absl::StrAppend(&text, turns ? "0.02, 1, 1e-5, 0.02\n" : "0.2, 1, 1e-5, 0.5\n");
   AppendBoundary(problem, &text);
   AppendBoneMotions(problem, &text);
-  // The last increment is printed whatever the frequency.
+  // CalculiX prints the last increment at any frequency.
   absl::StrAppend(&text, "*NODE PRINT, NSET=ALL, FREQUENCY=1000000\nU\n");
   if (problem.forces_and_stresses) AppendForcesAndStresses(tissues, &text);
   absl::StrAppend(&text, "*END STEP\n");

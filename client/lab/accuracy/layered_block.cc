@@ -61,7 +61,7 @@ absl::StatusOr<LayeredBlock> MakeLayeredBlock(const std::array<int, 3>& cells) {
       TetMesh mesh, BarMesh({EvenPlanes(0, kLengthMm, cells[0]), EvenPlanes(0, kWidthMm, cells[1]),
                              EvenPlanes(0, kHeightMm, cells[2])}));
   // The bottom is free between patch and rim. Were it fixed up to the patch, a patch that moves by
-  // more than a cell along would pass through fixed vertices: tets invert whatever the law.
+  // more than a cell along would pass through fixed vertices: tets invert under any material law.
   const auto is_bottom = [](const Eigen::Vector3d& v) { return v.z() == 0; };
   const std::vector<int32_t> fixed = VerticesWhere(
       mesh.positions(), [&](const Eigen::Vector3d& v) { return is_bottom(v) && IsInRim(v); });

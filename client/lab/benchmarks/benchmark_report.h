@@ -19,7 +19,7 @@ struct BenchmarkRow {
   int64_t vertices = 0;
   int64_t tets = 0;
   double ours_seconds = 0;
-  std::string peer = "-";              // there is none
+  std::string peer = "-";              // no peer
   std::optional<double> peer_seconds;  // empty: no peer, or one that would take too long here
   int64_t bytes = 0;                   // that our side holds for it; 0 where nothing is held
   int64_t answer_vertices = 0;         // that the answer was asked for; 0: all

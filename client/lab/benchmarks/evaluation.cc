@@ -162,8 +162,8 @@ void AddMemory(const MemoryUse& use, TargetList* list) {
 }  // namespace
 
 std::vector<Growth> GrowthExponents(const std::vector<BenchmarkRow>& rows) {
-  // log seconds by log tets, or log vertices that are answered; one entry a mesh, whatever the
-  // number of peers.
+  // log seconds by log tets, or by log of the answered vertices; one entry per mesh, for any number
+  // of peers.
   std::vector<std::string> works;
   std::map<std::string, std::map<double, double>> points;
   for (const BenchmarkRow& row : rows) {

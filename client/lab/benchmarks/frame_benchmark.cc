@@ -120,7 +120,7 @@ absl::Status FrameBenchmark::Prepare(int threads) {
 absl::Status FrameBenchmark::MakeResponse() {
   ResponseOptions options{.model = ModelOf(kind_)};
   if (kind_ == Kind::kNeoHookean) {
-    options.max_estimate_mm = Diagonal(bar_.mesh);  // whatever it is: frames are timed
+    options.max_estimate_mm = Diagonal(bar_.mesh);  // accepts any estimate: frames are timed
   } else {
     // The bound counts everything at its worst, so that answers are nearer than a millionth.
     options.tolerance_mm = 1e-6 * Diagonal(bar_.mesh);

@@ -70,8 +70,8 @@ void RunRepetition(const TimedWork& work, benchmark::State& state) {
 void InitializeOnce() {
   static const bool initialized = [] {
     std::string program = "tissueform-benchmarks";
-    // Repetitions of all work in random order: what else the machine does meanwhile, and how warm
-    // it is, hits ours and the peers alike.
+    // Repetitions of all work in random order: other load on the machine, and how warm it is,
+    // affects ours and the peers alike.
     std::string interleave = "--benchmark_enable_random_interleaving=true";
     char* arguments[] = {program.data(), interleave.data(), nullptr};
     int count = 2;

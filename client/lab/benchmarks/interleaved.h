@@ -22,7 +22,7 @@ struct TimedWork {
 };
 
 // Runs every piece of work `repetitions` times with Google Benchmark, repetitions of all pieces in
-// random order, so that what the machine does meanwhile falls on all of them alike. Warm up before.
+// random order, so that other load on the machine affects all of them alike. Warm up before.
 //
 // Returns the medians over repetitions as "name/part". Errors: the first one that a piece of work
 // returned. REQUIRES: repetitions >= 1; one call at a time.

@@ -32,7 +32,7 @@ bool IsChosen(const ExperimentOptions& options, const std::string& name) {
          std::find(options.cases.begin(), options.cases.end(), name) != options.cases.end();
 }
 
-// All before the first is solved, so that a missing plan is told of at once.
+// Builds all cases before the first is solved, so that a missing plan is reported at once.
 absl::StatusOr<std::vector<AccuracyCase>> ChosenCases(const ExperimentOptions& options) {
   std::vector<AccuracyCase> cases;
   for (const std::string& name : AccuracyCaseNames()) {

@@ -44,7 +44,7 @@ std::vector<NamedScheme> Schemes() {
           {"cosine, Anderson", fast_cosine, kBlue, CurveStyle::kDashed, {}}};
 }
 
-// The first update whose change is at most `limit_mm`, "-" when there is none.
+// The first update whose change is at most `limit_mm`, "-" if no update is.
 std::string UpdatesTo(const std::vector<double>& changes_mm, double limit_mm) {
   const auto found = std::find_if(changes_mm.begin(), changes_mm.end(),
                                   [=](double change) { return change <= limit_mm; });

@@ -28,7 +28,7 @@ namespace {
 
 constexpr double kPoissonRatio = 0.45;
 constexpr int kSamples = 128;
-// Below this nobody looks at a band (and its percentage means nothing).
+// Below this a band is irrelevant (and its percentage means nothing).
 constexpr double kLeastBandMm = 0.02;
 constexpr double kNear = 0.15;
 constexpr double kShownFactor = 2;

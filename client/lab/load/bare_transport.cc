@@ -29,7 +29,7 @@ class BareStream : public grpc::ServerBidiReactor<v1::DeformRequest, v1::DeformR
       Finish(grpc::Status::OK);
       return;
     }
-    // Made anew, as the positions of a frame are.
+    // Built for every answer, as the positions of a frame are.
     response_.Clear();
     response_.mutable_frame()->set_sequence(request_.pose().sequence());
     response_.mutable_frame()->set_positions(std::string(static_cast<size_t>(frame_bytes_), 'x'));

@@ -58,7 +58,7 @@ struct ClusterLoadResult {
 };
 
 // Runs it against `server`. The sessions have random ids, by whose hash a proxy spreads them; they
-// are deleted at the end. Errors while the drags are prepared; later ones are told in the result.
+// are deleted at the end. Errors while the drags are prepared; the result contains later ones.
 absl::StatusOr<ClusterLoadResult> RunClusterLoad(const ServerConnection& server,
                                                  const PlanProblem& problem,
                                                  const ClusterLoadOptions& options);

@@ -159,7 +159,7 @@ class LoadDrag {
   absl::Status status_;
 };
 
-// A client that makes and deletes sessions until it is told to stop.
+// A client that makes and deletes sessions until `stop` is set.
 class Churn {
  public:
   // `number` of `count`, so that no two sessions have the same stiffness.
@@ -256,7 +256,7 @@ absl::StatusOr<LoadResult> RunLoad(const ServerConnection& server, const PlanPro
   const Stopwatch preparing;
   std::vector<DragGroup> groups = GroupsOf(options);
   for (DragGroup& group : groups) TF_RETURN_IF_ERROR(Open(server, problem, &group));
-  // Whatever drags there are, the mesh is on the server while churn makes sessions of it.
+  // Even without drags, the mesh is on the server while churn makes sessions of it.
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(server));
   TF_ASSIGN_OR_RETURN(const v1::Mesh mesh, UploadMeshOf(client.get(), problem));
   std::vector<std::unique_ptr<Churn>> churn;

@@ -27,8 +27,8 @@ class DicomTexts {
   DicomTexts& operator=(const DicomTexts&) = delete;
 
   // The whole value (all of several, with "\\" between), without padding and control characters;
-  // empty where there is none. What cannot be converted has "?" for every byte that is not ASCII;
-  // what is longer than kMaxBytes is cut at a character. Both are told by `problem`.
+  // empty if the tag is missing. Text that cannot be converted has "?" for every byte that is not
+  // ASCII; a text over kMaxBytes is cut at a character. `problem` reports both.
   std::string Get(const DcmTagKey& tag);
 
   // What was wrong first, in one line without a value; empty: nothing.

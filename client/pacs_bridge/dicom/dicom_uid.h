@@ -9,8 +9,8 @@
 
 namespace tissueform {
 
-// A UID that nobody else has: 2.25 and a random UUID (version 4) as a decimal number, which needs
-// no root of an organisation (PS3.5 B.2). At most 44 characters. Any thread.
+// A globally unique UID: 2.25 and a random UUID (version 4) as a decimal number, which needs no
+// root of an organization (PS3.5 B.2). At most 44 characters. Any thread.
 std::string NewDicomUid();
 
 // Whether this is a UID by PS3.5 9.1: at most 64 digits and dots, no component empty or with a

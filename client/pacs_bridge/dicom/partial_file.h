@@ -14,8 +14,8 @@ namespace tissueform {
 // there is no room.
 absl::Status ErrorOfFile(int error_number, const std::string& path);
 
-// A file that a library writes by its name, and that nobody sees before it is whole and on the
-// disk. Its name ends in ".partial" by custom, so that what a crash leaves is known as such.
+// A file that a library writes by its name, and that gets its final name only when it is whole and
+// on the disk. Its name ends in ".partial" by custom, to identify what a crash leaves.
 class PartialFile {
  public:
   // An empty file that its owner alone may read, in place of what a crash has left there.

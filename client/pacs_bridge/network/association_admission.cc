@@ -25,7 +25,7 @@ void Refuse(T_ASC_Association* association, T_ASC_RejectParametersResult result,
   ASC_rejectAssociation(association, &rejection);
 }
 
-// The syntax that the sender likes best, whatever it is: nothing is decoded here. Deflated ones
+// The sender's preferred syntax, of any kind: nothing is decoded here. Not deflated ones: they
 // would be unpacked before any limit of theirs is known.
 const char* ChooseSyntax(const T_ASC_PresentationContext& context) {
   for (int i = 0; i < static_cast<int>(context.transferSyntaxCount); ++i) {

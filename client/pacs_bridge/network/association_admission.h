@@ -11,10 +11,10 @@
 
 struct T_ASC_Association;
 
-// Whether what asks to be an association may be one, and for what. Who may not is told so.
+// Decides whether a request for an association is accepted, and for what. Refusals are sent back.
 namespace tissueform {
 
-// By the AE titles of both sides. `crowded`: there is no room now, whoever it is.
+// By the AE titles of both sides. `crowded`: no association can be accepted now, from any peer.
 //
 // Errors, and the association is refused: Unavailable (crowded), PermissionDenied. The message
 // contains no text of the other side.

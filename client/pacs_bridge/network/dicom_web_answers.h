@@ -22,7 +22,7 @@ PatientSummary PatientSummaryFrom(const nlohmann::json& object);
 
 // Whether STOW-RS has stored an object that was sent alone: `text` is what the PACS answers with
 // HTTP status 200, 202 (stored with warnings) or 409 (refused). It is stored only where it is
-// listed as stored. A duplicate is, too: our UIDs are nobody else's, so it was sent before.
+// listed as stored. So is a duplicate: only this bridge uses our UIDs, so it was sent before.
 //
 // Errors, one line with UID and reason: Unavailable (the PACS has no room, or says nothing of the
 // object: Orthanc 1.10 with a full disk answers 200 and two empty lists), FailedPrecondition (it

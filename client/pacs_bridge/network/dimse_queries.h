@@ -19,7 +19,7 @@ class DcmDataset;
 // service.
 namespace tissueform {
 
-// What is wanted: a level, keys with a value to match, keys without to be told.
+// A query: a level, keys with a value to match, and keys without a value, which the peer fills in.
 struct StudyRootQuery {
   std::string level = {};  // "STUDY", "SERIES", "IMAGE"
   std::vector<std::pair<DcmTagKey, std::string>> keys = {};
@@ -38,7 +38,7 @@ absl::StatusOr<FetchCounts> MoveByDimse(const std::string& peer_name, DimseAssoc
                                         const StudyRootQuery& query, const std::string& destination,
                                         int silence_seconds);
 
-// They come on the same association; `announced` says from whom.
+// They come on the same association; `announced` holds the sender's AE title and address.
 absl::StatusOr<FetchCounts> GetByDimse(const std::string& peer_name, DimseAssociation* association,
                                        const StudyRootQuery& query, int silence_seconds,
                                        const AnnouncedInstance& announced,

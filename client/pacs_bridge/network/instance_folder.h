@@ -18,7 +18,7 @@
 namespace tissueform {
 
 struct InstanceFolderOptions {
-  std::string path = {};  // is there, on one file system, nobody else's
+  std::string path = {};  // exists, on one file system, used by this process only
   // Nothing is taken that would leave less than this free on the disk.
   int64_t watermark_bytes = int64_t{2} << 30;
   DicomLimits limits = {};  // of one object

@@ -47,15 +47,15 @@ struct RefusedConnection {
   std::string reason = {};      // one line without text from outside
 };
 
-// Whoever takes what is received. Threads: called from many at once. What is in one association
-// need not be of one patient, study or series.
+// Takes what is received. Threads: called from many at once. The instances of one association may
+// belong to several patients, studies or series.
 class InstanceSink {
  public:
   virtual ~InstanceSink() = default;
 
-  // Called when the file is durable and before the sender is told so: what returns OK is kept for
-  // good, and the sender forgets it. Otherwise the file goes, unless it was there before, and the
-  // sender is told: ResourceExhausted 0xA700 (out of resources: it tries again), AlreadyExists
+  // Called when the file is durable and before the sender gets its answer: after OK the file is
+  // kept for good, and the sender forgets it. Otherwise the file goes, unless it was there before,
+  // and the sender gets: ResourceExhausted 0xA700 (out of resources: it tries again), AlreadyExists
   // 0x0111 (duplicate), InvalidArgument 0xC000 (cannot understand), else 0x0110 (failure).
   virtual absl::Status Keep(const ReceivedInstance& instance) = 0;
 

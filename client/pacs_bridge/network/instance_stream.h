@@ -17,7 +17,7 @@ namespace tissueform {
 
 // Where DCMTK writes the bytes of an object that comes, as they come: a file with a meta header of
 // ours before them. After the first failure (the disk, a limit) it swallows what else comes, so
-// that the association goes on and the sender can be told.
+// that the association goes on and the sender can receive the status.
 class InstanceStream : public DcmOutputStream {
  public:
   // `partial` is there and empty; OK in `failure` or not: the stream can be written to.

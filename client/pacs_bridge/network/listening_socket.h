@@ -30,7 +30,7 @@ class ListeningSocket {
   std::optional<Connection> Accept();
   // From any thread, until it is closed: Accept returns, now and every time.
   void Wake();
-  // Refuses whoever still waits. Nobody is in Accept or Wake, nor calls them later.
+  // Refuses connections that still wait. REQUIRES: no thread is in Accept or Wake, now or later.
   void Close();
 
  private:

@@ -26,8 +26,8 @@ class MultipartSplitter {
   // A part's headers are no longer.
   static constexpr size_t kMaxHeaderBytes = 16 << 10;
 
-  // `content_type` is that of the answer. Errors: InvalidArgument (no multipart/related, or a
-  // boundary that is none).
+  // `content_type` is that of the answer. Errors: InvalidArgument (not multipart/related, or an
+  // invalid boundary).
   static absl::StatusOr<MultipartSplitter> Create(absl::string_view content_type, Events events);
 
   // Errors: those of the events; InvalidArgument (not as the standard wants it).

@@ -14,11 +14,11 @@
 
 namespace tissueform {
 
-// Lets `fetch` bring one object that the PACS has listed into a folder beside `path`, keeps its
+// Lets `fetch` bring one object that the PACS has listed into a folder next to `path`, keeps its
 // header, without pixels, as the file `path` (0600), and removes the rest.
 //
-// Errors: those of `fetch`, but Unavailable when nothing came, whatever it says of that; those of
-// CopyHeaderOnly.
+// Errors: Unavailable when the object did not arrive, if `fetch` returns OK or NotFound; other
+// errors of `fetch`; those of CopyHeaderOnly.
 absl::Status KeepOneHeader(
     const std::string& path,
     const std::function<absl::Status(const InstanceFolder& folder, InstanceSink* sink)>& fetch);

@@ -42,10 +42,9 @@ class SocketLayer : public DcmTransportLayer {
 // The longest wait for one read or write of a socket.
 void SetSilence(int socket, std::chrono::seconds silence);
 
-// Reads an association request from a socket that somebody has accepted, and owns it from then on,
-// also when this fails. DCMTK knows how to listen in one thread alone, where whoever connects and
-// says nothing stops all others; so sockets are accepted elsewhere and each is given to it in a
-// thread of its own.
+// Reads an association request from an accepted socket, and owns it from then on, also when this
+// fails. DCMTK can listen in one thread only, where a client that connects and says nothing stops
+// all others; so sockets are accepted elsewhere and each is given to it in a thread of its own.
 //
 // `*network` and `*association` are the caller's to drop, where they are not null.
 OFCondition ReceiveAssociationFrom(int socket, DcmTransportLayer* secure,

@@ -27,7 +27,7 @@
 namespace tissueform {
 namespace {
 
-// Connections beyond max_associations that are told so; more are closed without a word.
+// Connections beyond max_associations that receive a refusal; more are closed without an answer.
 constexpr int kTold = 16;
 
 absl::Status CheckOptions(const ReceiverOptions& options) {

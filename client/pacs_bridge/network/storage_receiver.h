@@ -22,7 +22,7 @@ struct ReceiverOptions {
   std::string address = "127.0.0.1";    // to listen at; "0.0.0.0": all of IPv4
   int port = 0;                         // 0: a free one
   std::string ae_title = "TISSUEFORM";  // by which it must be called
-  // Who may send: calling AE titles; empty: nobody.
+  // The calling AE titles that may send; empty: none.
   std::vector<std::string> calling_ae_titles = {};
   // From where: IPv4 addresses or networks ("10.1.2.0/24").
   std::vector<std::string> addresses = {"127.0.0.1"};

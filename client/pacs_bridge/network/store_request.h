@@ -14,7 +14,7 @@ struct T_DIMSE_C_StoreRQ;
 namespace tissueform {
 
 // Takes the data set that follows a C-STORE request on any association (C-GET's too), and answers
-// it. `*status` is what the sender is told; an error: the association is broken.
+// it. `*status` is what the sender receives; an error: the association is broken.
 absl::Status ReceiveStore(T_ASC_Association* association, int presentation_context,
                           const T_DIMSE_C_StoreRQ& request, AnnouncedInstance announced,
                           int idle_seconds, const InstanceFolder& folder, InstanceSink* sink,

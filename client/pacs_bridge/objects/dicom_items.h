@@ -32,8 +32,8 @@ CodedTerm UnitTerm(const std::string& ucum);
 // else, and the backslash, which separates values, is "?".
 std::string PlainDicomText(absl::string_view text, size_t most);
 
-// Puts values into an item, replacing those that are there, until one fails: then it is told by
-// status(), with its tag. The item outlives it.
+// Puts values into an item, replacing those that are there, until one fails: then status() reports
+// the error, with its tag. The item outlives it.
 class ItemWriter {
  public:
   explicit ItemWriter(DcmItem* item) : item_(item) {}

@@ -14,7 +14,7 @@ namespace tissueform {
 inline constexpr int kIconPixels = 64;  // each way
 
 // A small picture of a surface, from the patient's right and front, row by row from the top: black
-// where there is none, the brighter the more a triangle faces the observer. For lists of models;
+// outside the surface, the brighter the more a triangle faces the observer. For lists of models;
 // needs no display.
 std::vector<uint8_t> DrawModelIcon(const FloatPositions& positions,
                                    const TriangleIndices& triangles, const HeadFrame& frame);

@@ -66,8 +66,8 @@ std::vector<std::string> PredictionUidKeys(const CaseFile& contents);
 // "series:models" of "stl:skin".
 std::string SeriesKeyOf(const std::string& object_key);
 
-// InvalidArgument: a list over its limit; a UID that is missing, or is none; two alike; a band, a
-// measure or a text that is none. Paths and surfaces are left to who reads them.
+// InvalidArgument: a list over its limit; a missing or invalid UID; two alike; an invalid band,
+// measure or text. The code that reads paths and surfaces checks those.
 absl::Status CheckPredictionInput(const PredictionObjectsInput& input);
 
 std::map<std::string, HandlePose> PosesOf(const v1::Prediction& prediction);

@@ -16,7 +16,7 @@ class DcmDataset;
 namespace tissueform {
 
 // The tree of a Comprehensive SR while it is made, from the top: DCMTK's, which checks that an item
-// may stand where it is put. What fails first is told by Write.
+// may stand where it is put. Write reports what fails first.
 class ReportTree {
  public:
   explicit ReportTree(const CodedTerm& title);

@@ -34,7 +34,7 @@ class BridgeQueue {
   // Makes the folder or takes the one that is there, and holds it until the end: one process at a
   // time works on a queue. Errors: those of DataFolder::Open; FailedPrecondition (a newer queue).
   static absl::StatusOr<std::unique_ptr<BridgeQueue>> Open(const std::string& folder);
-  // For looking, beside a process that works on it. Errors: NotFound.
+  // Read-only, for inspection while another process works on it. Errors: NotFound.
   static absl::StatusOr<std::unique_ptr<BridgeQueue>> OpenForReading(const std::string& folder);
 
   // All of `change`, durable when it returns, or nothing.

@@ -33,7 +33,7 @@ class ExportRows {
   absl::Status Confirm(const std::string& name, const std::string& digest);
 
   // Those that have waited for a person since before `before_s` become kFailed, with this note; the
-  // server is yet to be told. Returns how many.
+  // server does not know that yet. Returns how many.
   absl::StatusOr<int> FailAsked(int64_t before_s, const std::string& note);
   // All that is known of it, its objects' UIDs too. Nothing happens where it is not there.
   absl::Status Remove(const std::string& name);

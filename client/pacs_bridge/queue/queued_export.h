@@ -46,7 +46,7 @@ struct QueuedObject {
   bool sent = false;
 };
 
-// Of a row with all columns of exports. Errors: DataLoss: a state that is none.
+// From a row with all columns of exports. Errors: DataLoss: an unknown state.
 absl::StatusOr<QueuedExport> ExportOf(const Database::Query& row);
 
 }  // namespace tissueform

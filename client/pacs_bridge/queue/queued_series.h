@@ -49,7 +49,7 @@ struct QueuedSeries {
   std::string case_name = {};  // "cases/{sha256}" when it is packed: the last one
   int64_t attempts = 0;        // of the step that is next
   std::string last_error = {};
-  int64_t first_s = 0;  // wall clock, to be told and for retention
+  int64_t first_s = 0;  // wall clock, for reports and retention
   int64_t done_s = 0;   // since when nothing is done with it; 0: it is being worked on
   bool has_files = true;
   bool has_header = false;
@@ -63,11 +63,11 @@ struct QueuedImage {
   std::string file = {};
 };
 
-// Those that a plan is built of: the images of CT classes; all where there are none. What else came
-// in a series (captures, reports) is no source of a plan and may lie in no frame of reference.
+// The images for a plan: those of CT classes, or all if there are no such images. Other objects of
+// a series (captures, reports) are not a source of a plan and may be without a frame of reference.
 std::vector<QueuedImage> SourcesAmong(const std::vector<QueuedImage>& images);
 
-// Of a row with the columns that ReceivedRows selects. Errors: DataLoss: a state that is none.
+// From a row with the columns that ReceivedRows selects. Errors: DataLoss: an unknown state.
 absl::StatusOr<QueuedSeries> SeriesOf(const Database::Query& row);
 
 }  // namespace tissueform

@@ -14,7 +14,7 @@
 namespace tissueform {
 namespace {
 
-// Series are complete after seconds without an image; nobody waits for less.
+// Series are complete after seconds without an image, so a shorter pause is not needed.
 constexpr std::chrono::milliseconds kIntakePause{250};
 constexpr std::chrono::milliseconds kStepPause{1000};
 constexpr std::chrono::hours kDeletionPause{1};
@@ -22,7 +22,7 @@ constexpr std::chrono::hours kDeletionPause{1};
 constexpr std::chrono::seconds kDraftsPause{5};
 // Whether exports that wait were taken back, which no watch tells.
 constexpr std::chrono::minutes kLookPause{5};
-// What a server may tell of before it is taken; each is told again by the next watch.
+// Exports that a server may report before they are taken; the next watch reports each again.
 constexpr size_t kMaxHeard = 4096;
 // Of the threads; the last is also among the keys of what is tried again.
 constexpr char kIntake[] = "intake";
@@ -167,7 +167,7 @@ void BridgeService::TakeHeard() {
   }
 }
 
-// The watch may go on although another server, which the taking was told to, has gone.
+// The watch may go on while Take fails because it reaches another server, which has gone.
 bool BridgeService::TakeNow(const v1::Export& told) {
   if (!take_retries_.Due(told.name())) return false;
   const absl::Status status = parts_.exports->Take(told);

@@ -32,7 +32,7 @@ std::string WithoutEmptyEnd(absl::string_view name) {
   return std::string(strip(absl::StrJoin(groups, "="), "="));
 }
 
-// Whom the PACS's query names: `kept` itself where that says the same.
+// The patient that the PACS's query names: `kept` itself if both are the same.
 absl::StatusOr<PatientIdentity> AskWhoseItIs(PacsClient* pacs, const std::string& study_uid,
                                              const PatientIdentity& kept) {
   absl::StatusOr<PatientSummary> told = pacs->FindPatient(study_uid);

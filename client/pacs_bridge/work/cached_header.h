@@ -24,7 +24,7 @@ struct CachedHeader {
 // Whose a series is now.
 struct FoundPatient {
   PatientIdentity patient = {};
-  // False: the PACS gives nobody a header, and names another patient than the one that is kept.
+  // False: the PACS returns no headers, and names another patient than the one that is kept.
   bool has_header = true;
   // Where the header is not the PACS's own: why, in one line without anything of a patient.
   std::string remark = {};
@@ -33,7 +33,7 @@ struct FoundPatient {
 // For a PACS that offers no service that gives a header: copies the kept one to `path`, if it is
 // young enough and the PACS's query names the same patient, or there is no query either.
 //
-// Errors: FailedPrecondition: none is kept any longer, or SeriesIsGone; Refused; of the disk.
+// Errors: FailedPrecondition: no header is kept now, or SeriesIsGone; Refused; of the disk.
 absl::StatusOr<FoundPatient> TakeKeptHeader(PacsClient* pacs, const CachedHeader& known,
                                             const std::string& path);
 

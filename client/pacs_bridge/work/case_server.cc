@@ -26,7 +26,7 @@ MeshPayloadView PayloadOfCase(const CaseMesh& mesh) {
           .segments = {mesh.payload}};
 }
 
-// Cancels a watch that was ended, or that says nothing any longer, from a thread of its own.
+// Cancels a watch that was ended, or that has become silent, from a thread of its own.
 class WatchEnd {
  public:
   WatchEnd(ExportWatchStream* watch, const Cancellation& cancelled)

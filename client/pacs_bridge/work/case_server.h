@@ -27,7 +27,7 @@ struct ServedPrediction {
   Positions positions = {};  // #V by 3, LPS, mm
 };
 
-// What the bridge asks of a Tissueform server. Nothing that it is told names a patient.
+// What the bridge asks of a Tissueform server. The server receives nothing that names a patient.
 //
 // Any thread. Errors carry the server's code and reason.
 class CaseServer {

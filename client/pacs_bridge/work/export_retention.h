@@ -12,9 +12,9 @@
 
 namespace tissueform {
 
-// Lets exports fail that nobody has confirmed for too long, by the wall clock `now_s`, and forgets
-// those that ended long ago, with their folders. Returns how many. Errors: those of the queue; a
-// folder that cannot be deleted is tried again.
+// Marks exports as failed that have waited too long for a confirmation, by the wall clock `now_s`,
+// and forgets those that ended long ago, with their folders. Returns how many. Errors: those of the
+// queue; a folder that cannot be deleted is tried again.
 absl::StatusOr<int> DeleteOldExports(BridgeQueue* queue, const RetentionOptions& options,
                                      int64_t now_s);
 

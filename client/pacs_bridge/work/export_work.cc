@@ -188,7 +188,7 @@ absl::Status ExportWork::Fetch(QueuedExport* queued) {
 
 absl::Status ExportWork::AskAnew(QueuedExport* queued, const std::string& study_uid,
                                  const FoundPatient& now) {
-  // The server first: what is told of the change must not be compared with what was written by it.
+  // The server first: its notice of this change must not be compared with what this step writes.
   TF_RETURN_IF_ERROR(server_->UpdateExport(queued->name, v1::EXPORT_STATE_CONFIRMATION,
                                            "the patient's data changed: waits for confirmation",
                                            0));
@@ -239,7 +239,7 @@ absl::Status ExportWork::Draw(const QueuedExport& queued) {
   const absl::StatusOr<ExportMaterial> material = Gather(queued);
   const absl::Status status =
       material.ok() ? pictures_.Make(queued, *material).status() : material.status();
-  // It may have failed meanwhile, or be gone, and whoever told so has removed the folder.
+  // The export may have ended since then and its folder been removed: do not leave a new one.
   const absl::StatusOr<QueuedExport> now = rows_.Get(queued.name);
   if (now.ok() ? now->done_s != 0 : absl::IsNotFound(now.status())) {
     std::error_code ignored;
@@ -323,7 +323,7 @@ absl::Status ExportWork::TellStored(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects, rows_.ListObjects(queued->name));
   const absl::Status told =
       server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORED, "", CountSent(objects));
-  // Whoever asked has taken it back meanwhile: it is in the PACS all the same.
+  // NotFound: the user has taken the export back since then; it is in the PACS nevertheless.
   if (!told.ok() && !absl::IsNotFound(told)) return told;
   TF_FAULT_POINT("export.told");
   std::error_code ignored;

@@ -21,7 +21,7 @@
 namespace tissueform {
 
 struct ExportWorkOptions {
-  // How long a kept header stands for the PACS's own where that gives nobody one.
+  // How long a kept header stands for the PACS's own where the PACS returns no headers.
   std::chrono::seconds header_lifetime = std::chrono::hours(24) * 90;
   // Told in one line what is left out although nothing stops for it; nothing of a patient. May be
   // empty.
@@ -30,11 +30,11 @@ struct ExportWorkOptions {
   std::function<void(const std::string& line)> inform = {};
 };
 
-// From a planner's wish to objects in the patient's study, one durable step after the other:
+// From a surgeon's request to objects in the patient's study, one durable step after the other:
 //
 //   asked      waits for a person (ExportRows::Confirm), who has seen the patient
-//   confirmed  fetches the patient's header; who is another one than the person has seen goes back
-//              to asked, with a note
+//   confirmed  fetches the patient's header; if that names another patient than the person has
+//              seen, goes back to asked, with a note
 //   fetched    puts UIDs into the queue, then writes the objects
 //   written    asks the PACS for each, and sends those that it has not
 //   sent       tells the server
@@ -55,15 +55,14 @@ class ExportWork {
         options_(options),
         pictures_(server, writer, options.warn) {}
 
-  // Takes what the server tells of an export into the queue. A case that is none of this bridge is
-  // another bridge's: nothing happens but a line that says so. Errors: those of the queue and,
+  // Takes what the server reports of an export into the queue. A case that is unknown here belongs
+  // to another bridge: nothing happens but a line that says so. Errors: those of the queue and,
   // while drafts wait, of the server.
   absl::Status Take(const v1::Export& told);
 
-  // Draws the pictures for one that is asked for, for who is to confirm it, and asks for its band;
-  // nothing happens where they are there. Step waits for it where it needs them. `queued.attempts`
-  // says how often it was tried. Errors: those of the server and of drawing; they keep nobody from
-  // confirming.
+  // Draws the pictures of a requested export for the person who confirms it, and asks for its band;
+  // does nothing if they exist. Step waits for it where it needs them. `queued.attempts` says how
+  // often it was tried. Errors: those of the server and of drawing; confirming is still possible.
   absl::Status Draw(const QueuedExport& queued);
 
   // Whether the server still has an export that waits for a person. One that was taken back, has
@@ -82,7 +81,7 @@ class ExportWork {
   absl::StatusOr<QueuedSeries> SeriesOfCase(const std::string& case_name);
   absl::Status RunStep(QueuedExport* queued);
   absl::Status Fetch(QueuedExport* queued);
-  // Back to the person: whoever confirmed has seen somebody else than the PACS names now.
+  // Back to the person: the PACS now names another patient than the one that was confirmed.
   absl::Status AskAnew(QueuedExport* queued, const std::string& study_uid, const FoundPatient& now);
   absl::StatusOr<ExportMaterial> Gather(const QueuedExport& queued);
   absl::Status Write(QueuedExport* queued);

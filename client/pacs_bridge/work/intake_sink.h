@@ -16,8 +16,8 @@
 
 namespace tissueform {
 
-// Shows what is received to the intake. What comes again with other bytes is refused: nobody can
-// say which of two images of one name is right. Thread-safe.
+// Shows what is received to the intake. What comes again with other bytes is refused: it is unknown
+// which of two images of one name is right. Thread-safe.
 class IntakeSink final : public InstanceSink {
  public:
   explicit IntakeSink(SeriesIntake* intake) : intake_(intake) {}

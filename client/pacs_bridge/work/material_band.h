@@ -28,7 +28,7 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
                                                     const CaseFile& contents,
                                                     const v1::Prediction& prediction);
 
-// Why a prediction has no band, in words for a report, without asking anybody: the case gives no
+// Why a prediction has no band, in words for a report, found without a request: the case gives no
 // ranges, the model is not elastic, it was predicted with another stiffness than the case's,
 // or a segment turns so far that linear elasticity takes it for strain. Empty where there may be
 // one, and where the case is damaged.

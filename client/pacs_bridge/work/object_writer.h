@@ -46,8 +46,8 @@ class ObjectWriter {
   // are in ("series:..."), which are never sent themselves.
   virtual absl::StatusOr<std::vector<std::string>> KeysOf(const ExportMaterial& material) = 0;
 
-  // Draws the prediction for whoever is to confirm it, PNG files in `folder`, which is not there.
-  // Of the material case and prediction are needed.
+  // Draws the prediction for the person who confirms it: PNG files in `folder`, which does not
+  // exist yet. Of the material, only case and prediction are needed.
   virtual absl::Status Draw(const ExportMaterial& material, const std::string& folder) = 0;
 
   // Errors: InvalidArgument (case and prediction do not fit), those of the disk.

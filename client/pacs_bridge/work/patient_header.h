@@ -23,7 +23,7 @@ namespace tissueform {
 absl::StatusOr<FoundPatient> FetchPatientHeader(PacsClient* pacs, const CachedHeader& known,
                                                 const std::string& path);
 
-// What a person is told of a patient who is not the one that was seen; says of neither who it is.
+// The note for a person when the patient is not the one that was seen; it identifies neither.
 std::string WhatHasChanged(const PatientIdentity& seen, const PatientIdentity& now);
 
 }  // namespace tissueform

@@ -42,7 +42,7 @@ constexpr size_t kMaxDraftBytes = size_t{4} << 30;
 constexpr size_t kCaseTitleDigits = 8;
 constexpr char kCases[] = "cases/";
 
-// The images of one series as the only ones of a folder, whatever else lies beside them.
+// Links the images of one series into a folder of their own, without the other files next to them.
 absl::Status LinkImages(const std::vector<QueuedImage>& images, const std::string& folder) {
   std::error_code error;
   fs::remove_all(folder, error);

@@ -63,15 +63,15 @@ class PlanWork {
         options_(std::move(options)) {}
 
   // The next step of `series`, which was read from the queue, and whose new state is written there
-  // and into it. An error that is no transient one makes the series kFailed, with the reason; the
+  // and into it. An error that is not transient makes the series kFailed, with the reason; the
   // others count an attempt.
   //
-  // Errors: those of the step, for whoever tells them; they hold nothing of a patient. Aborted:
-  // more images have come while the plan was built: it is thrown away, and `series` is read anew.
+  // Errors: those of the step, for the log; they hold nothing of a patient. Aborted: more images
+  // have come while the plan was built: it is thrown away, and `series` is read again.
   absl::Status Step(QueuedSeries* series);
 
   // Asks the server what was made of the drafts there: each case is noted as one of its series.
-  // Returns keys of series whose state has changed. Asks nothing where there are none.
+  // Returns keys of series whose state has changed. Sends no request without drafts.
   absl::StatusOr<std::vector<std::string>> FollowDrafts();
 
  private:

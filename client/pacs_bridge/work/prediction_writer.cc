@@ -53,7 +53,7 @@ PredictionObjectsInput InputOf(const ExportMaterial& material) {
   }
   input.measures.assign(material.asked.measures().begin(), material.asked.measures().end());
   input.uids = material.uids;
-  // Of the wish, not of this moment: the same again writes the same bytes.
+  // The time of the request, not of this moment: writing again gives the same bytes.
   input.made = absl::FromUnixSeconds(material.asked.create_time().seconds());
   return input;
 }

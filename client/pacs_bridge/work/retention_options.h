@@ -17,9 +17,9 @@ struct RetentionOptions {
   // The header without pixels that stands for the PACS where that cannot be asked for one; and what
   // is known of a series of which no case was made, and of its patient.
   std::chrono::hours keep_headers{24 * 90};
-  // An export that nobody confirms, with the pictures of it; then it has failed.
+  // An unconfirmed export, with its pictures; after that it has failed.
   std::chrono::hours keep_asked{24 * 14};
-  // What is known of an export, after the server was told how it has ended.
+  // What is known of an export, after its result was reported to the server.
   std::chrono::hours keep_exports{24 * 30};
 };
 

@@ -18,7 +18,7 @@ namespace tissueform {
 bool MayCome(const absl::Status& status);
 
 // When a step that failed is tried again, by the key of whose step it is: after a second, then
-// longer each time, up to a minute. By the monotonic clock, which nobody sets; after a restart
+// longer each time, up to a minute. By the monotonic clock, which cannot be set; after a restart
 // everything is tried at once. One thread at a time.
 class RetryTimes {
  public:

@@ -26,7 +26,7 @@ struct SeriesIntakeOptions {
   std::vector<SeriesRule> rules = {};  // none: nothing is chosen
   // A series is complete, or has stopped midway, when nothing came for so long.
   std::chrono::milliseconds quiet{30'000};
-  // What the PACS has of a study; empty, or an error: nobody knows. Called on the thread of Settle.
+  // What the PACS has of a study; empty, or an error: unknown. Called on the thread of Settle.
   std::function<absl::StatusOr<std::vector<SeriesSummary>>(const std::string& study_uid)>
       find_series = {};
   std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
@@ -35,11 +35,11 @@ struct SeriesIntakeOptions {
 // Takes what is received into the queue, finds out when a series is complete, and chooses which one
 // of its study becomes a plan.
 //
-// A file that is on the disk is received: its sender may be told before the queue knows it, and
-// Recover finds it there after a crash. A series is complete
+// A file that is on the disk is received: its sender may get an answer before the queue knows it,
+// and Recover finds it there after a crash. A series is complete
 //   * when its association has ended and the queue has as many images as the PACS says, at once;
-//   * when nothing came for `quiet`, and the PACS says so; or nobody can say, its association was
-//     released by its sender, and no slice between its first and its last is missing.
+//   * when nothing came for `quiet`, and the PACS confirms it; or the PACS cannot tell, its
+//     association was released by its sender, and no slice between first and last is missing.
 // Otherwise it is incomplete after `quiet`, and nothing is made of it unless more comes.
 //
 // One of a study is chosen when none of it is being received and
@@ -106,7 +106,7 @@ class SeriesIntake {
   absl::StatusOr<std::optional<SeriesState>> Judge(const QueuedSeries& series);
   // Whether nothing that may be chosen of a study is still to come.
   absl::StatusOr<bool> IsAllThere(const std::string& study_uid);
-  // What the PACS has of a study, asked once in a round of Settle; null: nobody knows.
+  // What the PACS has of a study, asked once in a round of Settle; null: unknown.
   const std::vector<SeriesSummary>* AskPacs(const std::string& study_uid);
   bool MayBeChosen(const SeriesSummary& series) const;
   void ForgetOldStudies(const std::set<std::string>& waiting);

@@ -39,7 +39,7 @@ def _find_guard(server: pathlib.Path) -> pathlib.Path:
 
 
 class LocalServer:
-    """Made by local. address: "127.0.0.1:PORT". Ends with its `with` block or close, and with this process whatever ends it."""
+    """Made by local. address: "127.0.0.1:PORT". Ends with its `with` block or close, and with this process for any reason."""
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
         self._process = process

@@ -28,15 +28,15 @@ import { formatProgress } from "./planning/numbers";
 import { carryWork, restoreWork, takeCarriedWork, workOf } from "./workbench/work";
 import type { Workbench } from "./workbench/workbench";
 
-// What stands behind the # says which page this is:
+// The part after the # says which page this is:
 //
 //   nothing                            the list of cases
 //   #case={sha256}                     the planner of a case
 //   #case={sha256}&contact=off         the same, where tissue sticks and lips are one piece; so with followers
 //   #new                               a new plan from a CT
 //   #new&draft={id}                    the same, of a CT that waits on the server
-//   #follow={session}&case={sha256}    read-only, beside somebody who plans; where the server has logins, the link's token
-//                                      stands in the session's place, and nobody needs to sign in
+//   #follow={session}&case={sha256}    read-only, follows another user's plan; where the server has logins, the link's token
+//                                      takes the session's place, and followers need not sign in
 
 /** For tests and measurements: what the page holds now. Nothing of the page asks it. */
 interface TestHook {
@@ -51,7 +51,7 @@ interface TestHook {
 /** The page's own path: a proxy may have it below one of its own. */
 const base = baseOf(location.href);
 const gateway = new Gateway(base, new Bearer());
-/** Null where nobody logs in. */
+/** Null where the server has no logins. */
 let login: Login | null = null;
 let banner: HTMLElement | null = null;
 const hook: TestHook = { volume: () => pagePart(() => import("./volume/opened_ct")) };

@@ -11,9 +11,9 @@
 
 namespace tissueform {
 
-// The text of a JSON file that somebody else has written; `what` stands for its kind in messages
-// ("plan"). Reads a byte more than `most_bytes` at most, whatever the size of the file was a moment
-// ago.
+// The text of a JSON file from an external source; `what` stands for its kind in messages ("plan").
+// Reads at most one byte more than `most_bytes`, even if the size of the file has changed since it
+// was checked.
 //
 // Errors: NotFound (no such file), InvalidArgument (a folder or a device), ResourceExhausted (more
 // than most_bytes), PermissionDenied (cannot be read).

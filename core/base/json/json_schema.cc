@@ -79,8 +79,8 @@ struct JsonSchema::Compiled {
   int newest() const { return static_cast<int>(versions.size()); }
   const OneVersion& Of(int version) const { return *versions[static_cast<size_t>(version) - 1]; }
 
-  // The lowest version from `first` on whose schema the document follows but for what it says as
-  // its version; 0 when there is none.
+  // The lowest version from `first` on whose schema the document follows, apart from the version
+  // that it states; 0 if no version fits.
   int LowestThatFits(const Json& document, int first) const {
     for (int version = first; document.is_object() && version <= newest(); ++version) {
       if (Of(version).Violations(WithVersion(document, version)).empty()) return version;

@@ -13,7 +13,7 @@
 namespace tissueform {
 
 // Deepest nesting of arrays and objects that is read. Plans need some ten levels; the limit keeps a
-// hostile text from using up the stack of whatever walks over the result.
+// hostile text from using up the stack of code that walks over the result.
 inline constexpr size_t kMaxJsonDepth = 64;
 
 // Longest key. The schema's patterns are matched by std::regex, whose recursion grows with the

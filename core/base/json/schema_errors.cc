@@ -180,7 +180,7 @@ std::string Explain(const std::vector<SchemaViolation>& violations, const Json& 
                       Meaning(subschema));
 }
 
-// A key is whatever its writer put into it: line breaks, and commands to a terminal.
+// A key may hold any characters: line breaks, and control sequences of a terminal.
 std::string OnOneLine(const std::string& text) {
   std::string line;
   for (const char c : text) {

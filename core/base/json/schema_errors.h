@@ -18,8 +18,8 @@ struct SchemaViolation {
 
 // One line about the violation that is nearest to the mistake. The library reports a mistake again
 // at every level above it and for every alternative that it does not fit; those echoes are left
-// out. What is allowed is taken from `schema`, the one of the document's version; a key that only
-// `newest` knows is told with the version that it came with.
+// out. The allowed values come from `schema`, the one of the document's version; for a key that
+// only `newest` knows, the line names the version that introduced it.
 //
 // REQUIRES: at least one violation.
 std::string ExplainViolations(const std::vector<SchemaViolation>& violations,

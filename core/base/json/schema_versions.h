@@ -10,7 +10,7 @@ namespace tissueform {
 
 // How a format grows (docs/plan-format.md, "Versions"): a version only adds, and what it adds may
 // be left out. So one schema is published, that of the newest version, and those of the others
-// follow from it: whatever a version added carries "since_version": N in its subschema, and
+// follow from it: everything that a version added carries "since_version": N in its subschema, and
 // /properties/version/enum lists the versions, 1 to the newest.
 //
 // May carry it: a property that is not required, and an alternative of anyOf or oneOf.

@@ -63,8 +63,8 @@ struct Ends {
 
 absl::Status SystemError(absl::string_view what) { return absl::ErrnoToStatus(errno, what); }
 
-// A socket, not a pipe, because only for those writing without SIGPIPE can be asked for, whatever
-// the program does with that signal.
+// A socket, not a pipe: only writes to a socket can suppress SIGPIPE, independently of how the
+// program handles that signal.
 absl::StatusOr<Ends> OpenRequest() {
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -214,7 +214,7 @@ void ChildProcess::CloseRequest() {
 ChildEnd ChildProcess::Wait() { return *WaitFor(std::chrono::milliseconds::max()); }
 
 // WNOWAIT leaves the ended child as it is, so that its number stays its own until Reap has taken
-// the lock: Signal can never reach another process that got the number meanwhile.
+// the lock: Signal can never reach another process that has got the number since then.
 std::optional<ChildEnd> ChildProcess::WaitFor(std::chrono::milliseconds time) {
   const bool for_ever = time == std::chrono::milliseconds::max();
   const auto start = std::chrono::steady_clock::now();
@@ -229,7 +229,7 @@ std::optional<ChildEnd> ChildProcess::WaitFor(std::chrono::milliseconds time) {
   }
 }
 
-// Where SIGCHLD is ignored the system reaps by itself, and nobody knows how the child ended.
+// Where SIGCHLD is ignored the system reaps the child, and how it ended remains unknown.
 ChildEnd ChildProcess::Reap() {
   const MutexLock lock(mutex_);
   if (end_) return *end_;

@@ -59,8 +59,8 @@ struct ChildEnd {
 // other descriptor of ours, no blocked signal, and the default for those that we ignore, except
 // those with which a terminal or a shell ends programs (SIGHUP, SIGINT, SIGQUIT, SIGTERM).
 //
-// Made with posix_spawn: any thread may start children, whatever the others do, and the child does
-// not end when the thread that started it ends.
+// Created with posix_spawn: any thread may start children, independently of the others, and the
+// child does not end when the thread that started it ends.
 //
 // Threads: Signal may be called while another thread waits; otherwise one thread at a time.
 class ChildProcess {
@@ -111,8 +111,8 @@ class ChildProcess {
 // The folder in which the running program lies.
 std::string ProgramFolder();
 
-// Where a program of this product lies: in the folder of the running program, or in
-// ../libexec/tissueform seen from there, where programs are installed that nobody starts by hand.
+// The path of a program of this product: in the folder of the running program, or in
+// ../libexec/tissueform relative to it, where programs are installed that users do not run.
 //
 // Errors: NotFound, with what to do.
 absl::StatusOr<std::string> FindProgram(absl::string_view name);

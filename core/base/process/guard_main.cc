@@ -37,7 +37,7 @@ constexpr int kWrongUse = 2;
 constexpr int kCannotStart = 126;
 constexpr int kNoSuchProgram = 127;
 
-// -1: it is none.
+// -1 if the word is not a number.
 long long NumberOf(const char* word) {
   char* end = nullptr;
   const long long number = std::strtoll(word, &end, 10);
@@ -85,9 +85,10 @@ void Bind(const Limits& limits) {
   _exit(error == ENOENT ? kNoSuchProgram : kCannotStart);
 }
 
-// The exit code as a shell tells it; -1 while the program runs. What the program leaves behind is
-// killed before it is reaped, for until then nobody else can get its number, and not asked to end:
-// a shell's child that is asked before its exec may forget it with the shell's handlers.
+// The exit code as a shell reports it; -1 while the program runs. Processes that the program leaves
+// behind are killed before it is reaped, since until then no other process can get its number. They
+// get no SIGTERM: a shell's child that gets one before its exec may lose it with the shell's
+// handlers.
 int ExitCodeOf(pid_t program) {
   siginfo_t info{};
   if (waitid(P_PID, program, &info, WEXITED | WNOWAIT | WNOHANG) != 0 || info.si_pid == 0) {
@@ -155,7 +156,7 @@ int main(int argc, char** argv) {
     return kCannotStart;
   }
   if (program == 0) Become(argv + kFirstWord, guard, former, limits);
-  setpgid(program, program);                  // whoever of the two is first
+  setpgid(program, program);                  // both processes call it; either may be first
   ReplaceByNothing(STDOUT_FILENO, O_WRONLY);  // whose end is the program's alone
   return Watch(program, arriving, static_cast<int>(grace_ms));
 }

@@ -24,8 +24,8 @@ struct ProgramLimits {
 
 // A program that is not one of our helpers (an X server, a solver, a server of ours) and so does
 // not watch a pipe: it runs under tissueform-guard, which ends it and what it has started when this
-// object or this process ends, whatever ends that. Ending means SIGTERM, and SIGKILL when the
-// program is still there after the grace; what it leaves behind is killed.
+// object or this process ends, for any reason. Ending means SIGTERM, and SIGKILL when the program
+// is still there after the grace period; processes that it leaves behind are killed.
 //
 // Its exit code comes through: 128 + signal when one has ended it.
 class GuardedProgram {

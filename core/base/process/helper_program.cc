@@ -84,8 +84,8 @@ absl::Status NeedsMoreMemory(absl::string_view what, const IsolationLimits& limi
       absl::StrCat(what, " needs more than ", limits.max_memory_bytes, " bytes of memory"));
 }
 
-// Libraries with threads of their own turn bad_alloc into errors of theirs. Whoever has had most of
-// what it may take when it gives up, has given up for that.
+// Libraries with threads of their own turn bad_alloc into errors of theirs. If a process gives up
+// after using most of its memory limit, lack of memory is taken as the cause.
 bool HasTakenMost(const IsolationLimits& limits) {
   constexpr int64_t kBytesPerKibibyte = 1024;
   std::ifstream status("/proc/self/status");

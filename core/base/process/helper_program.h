@@ -29,11 +29,11 @@ inline constexpr int64_t kHelperCallVersion = 0x5446'0001;
 // input, and some know one state for the whole process. They live in helper programs, one call a
 // process, started by CallHelper (core/base/process/helper_call.h), which says how a call goes.
 //
-// Takes the limits from stdin and sets them on this process, so that whoever started it needs
-// none; sends what is printed nowhere; ends this process at once when the other end of stdin
-// closes, because the caller has died or no longer wants the answer. Then calls `work`, which reads
-// its request to the end before it sends anything, and begins its answer with PipeSender::Outcome.
-// Leaves by _exit: libraries are not taken down.
+// Takes the limits from stdin and sets them on this process, so that the process that started it
+// needs no limits itself; discards what is printed; ends this process at once when the other end of
+// stdin closes, because the caller has died or no longer wants the answer. Then calls `work`, which
+// reads its request to the end before it sends anything, and begins its answer with
+// PipeSender::Outcome. Leaves by _exit: libraries are not taken down.
 int RunHelperProgram(const std::function<void(const IsolationLimits& limits, PipeReceiver* request,
                                               PipeSender* answer)>& work);
 
@@ -44,10 +44,9 @@ absl::Status WithoutExceptions(absl::string_view what, const IsolationLimits& li
 
 // The parts of RunHelperProgram, for programs that live differently.
 
-// Starts a thread that ends this process, with SIGKILL's exit code and without any clearing up,
-// when nobody holds the other end of the socket or pipe any longer. Not PR_SET_PDEATHSIG, which
-// fires when the *thread* ends that started this process. The descriptor stays open and is not
-// read.
+// Starts a thread that ends this process, with SIGKILL's exit code and without any cleanup, when no
+// process holds the other end of the socket or pipe. Not PR_SET_PDEATHSIG, which fires when the
+// *thread* ends that started this process. The descriptor stays open and is not read.
 void EndWhenClosed(int descriptor);
 
 // From now on this process may use so much and leaves no core file. Memory

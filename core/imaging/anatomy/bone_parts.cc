@@ -111,9 +111,9 @@ uint8_t PartOf(const PieceShape& piece, const PieceShape& mandible) {
   return behind || in_the_neck ? kSpine : kCranium;
 }
 
-// Pieces at a threshold, not lower than the mandible's, at which the cranium does not hang together
-// with the spine: it ends above the middle of the mandible. Those of the mandible's threshold when
-// there is none.
+// Pieces at a threshold, not lower than the mandible's, at which the cranium is not connected to
+// the spine: it ends above the middle of the mandible. Those of the mandible's threshold when no
+// threshold has such pieces.
 Pieces PiecesWithoutNeck(const HeadSegmentation& head, const Markers& markers,
                          const DentalCut* cut) {
   // A cranium that ends above the middle of the mandible has no neck on it: the skull's base and

@@ -19,7 +19,7 @@ inline constexpr uint8_t kCranium = 1;   // with the upper jaw and its teeth
 inline constexpr uint8_t kMandible = 2;  // with the lower teeth
 inline constexpr uint8_t kSpine = 3;     // with the hyoid and other bones of the neck
 
-// How upper and lower teeth were told apart.
+// How upper and lower teeth were separated.
 enum class JawSeparation {
   kThreshold,     // they do not touch: above `marker_hu` they are separate pieces
   kAutomaticCut,  // they touch: cut by the plane with the best clearance

@@ -49,8 +49,8 @@ struct DentalCut {
 Pieces DensePieces(const HeadSegmentation& head, int threshold_hu, const DentalCut* cut);
 
 // The number of the largest piece with size and shape of a mandible: an arch, 70 to 150 mm wide,
-// open behind, whose upper third (the rami) lies farther back than its lower third (the chin);
-// neither cranium, upper jaw nor spine is that. 0 when there is none.
+// open behind, whose upper third (the rami) is farther back than its lower third (the chin);
+// cranium, upper jaw and spine do not match that. 0 if no piece matches.
 int32_t FindMandible(const Pieces& pieces);
 
 }  // namespace tissueform

@@ -14,8 +14,9 @@
 namespace tissueform {
 namespace {
 
-// Only so deep behind the air outside thin pieces are told apart: behind it the walls of nose,
-// mouth and throat are one with each other and with a tube that leads there. As thick as tubes are.
+// Thin pieces are separated only up to this depth behind the outside air: deeper, the walls of
+// nose, mouth and throat are connected with each other and with a tube that leads there. This
+// is the thickness of tubes.
 constexpr double kOutermostMm = 12;
 
 // Skin and muscle have up to 100 HU; plastic of tubes 200 to 500, less where a voxel holds but a

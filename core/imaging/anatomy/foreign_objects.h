@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// What touches the head in a CT and was told from it.
+// An object that touches the head in a CT and was separated from it.
 enum class ObjectKind {
   kTube,     // long, no thicker than a finger, with a wall denser than tissue
   kCord,     // a string: long and thin

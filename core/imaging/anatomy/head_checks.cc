@@ -59,8 +59,8 @@ struct Orientation {
   std::array<bool, 3> against = {false, false, false};
 };
 
-// All turns by quarters but the one that is no turn. No mirrored ones: left and right of a head
-// cannot be told apart.
+// All quarter turns except the identity. No mirrored ones: left and right of a head cannot be
+// distinguished.
 std::vector<Orientation> QuarterTurns() {
   std::vector<Orientation> turns;
   std::array<size_t, 3> along = {0, 1, 2};
@@ -238,8 +238,8 @@ absl::Status ExplainMissingAnatomy(const HeadSegmentation& head, bool occlusal_p
   const std::optional<Orientation> turn = FindTurn(head);
   const std::string missing = WithMetal(head, occlusal_plane_given, error.message());
   if (!turn.has_value()) return absl::InvalidArgumentError(missing);
-  // Beside the error, not in its place: in a head without a jaw a turned arch of the skull's base
-  // passes for one, and nobody should turn a head that lies right.
+  // In addition to the error, not in its place: in a head without a jaw a turned arch of the
+  // skull's base passes for one, and the user should not turn a head that is oriented correctly.
   return absl::InvalidArgumentError(absl::StrFormat(
       "%s; or the head does not lie as the CT says: its crown points to what is called the %s, its "
       "face to what is called the %s; correct `axes` of the recipe then, or what the file says of "

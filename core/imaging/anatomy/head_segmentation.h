@@ -35,7 +35,7 @@ struct HeadSegmentation {
   // on. All 0 where there is no metal.
   LabelGrid metal;
   // The head's voxels (1) that end where the CT does, not where the head does
-  // (core/imaging/anatomy/scanner_cut.h); without voxels where there are none.
+  // (core/imaging/anatomy/scanner_cut.h); without voxels where the CT does not cut the head.
   LabelGrid cut;
   HeadSegmentationOptions options;
 
@@ -46,11 +46,11 @@ struct HeadSegmentation {
       0;  // of the outer surface: nearer than 2.5 mm to bone; a living head 0..0.1
 };
 
-// Finds the largest body of tissue with the thin parts that hang on it (ears, the walls of a nose),
+// Finds the largest body of tissue with its connected thin parts (ears, the walls of a nose),
 // without objects that touch it, and its bone.
 //
-// `metal`, and `unscanned` (core/imaging/ct/unscanned.h), are masks on the CT's grid, or have no
-// voxels where there is none.
+// `metal`, and `unscanned` (core/imaging/ct/unscanned.h), are masks on the CT's grid; each is
+// without voxels when there is nothing to mask.
 //
 // Errors: InvalidArgument when there is too little tissue or bone for a head, or when no soft
 // tissue covers the bone (a skull, a phantom).

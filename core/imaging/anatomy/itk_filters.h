@@ -34,7 +34,7 @@ struct Components {
   VoxelGrid<int32_t> labels;
   std::vector<int64_t> voxels;  // of component i + 1
 
-  // The component as a mask, empty when there is none of that number.
+  // The component as a mask, empty if no component has that number.
   LabelGrid Mask(int32_t component) const;
 };
 

@@ -19,11 +19,11 @@ namespace tissueform {
 double RemoveStreaks(HeadSegmentation* head);
 
 // Gives metal to the teeth it sits on. `labels` are those of the parts of the bone, 0 outside, and
-// those of metal are made anew: each piece (brackets with their wire, a filling) goes to the part
-// that it touches most. A piece that touches another part a quarter as much or more holds fillings
-// of both, and so may every piece with a cut, which stands for jaws that touch: these go voxel by
-// voxel to the nearest part. With a cut, what lies within 5 mm of metal keeps to its side of the
-// plane, upper jaw above and lower below: there the density, by which parts are told apart, is the
+// those of metal are assigned again: each piece (brackets with their wire, a filling) goes to the
+// part that it touches most. A piece that touches another part a quarter as much or more holds
+// fillings of both, and so may every piece with a cut, which stands for jaws that touch: these go
+// voxel by voxel to the nearest part. With a cut, voxels within 5 mm of metal stay on their side of
+// the plane, upper jaw above and lower below: there the density, which separates the parts, is the
 // metal's.
 void AssignMetal(const HeadSegmentation& head, const DentalCut* cut, LabelGrid* labels);
 

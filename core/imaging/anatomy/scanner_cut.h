@@ -21,8 +21,8 @@ namespace tissueform {
 
 // The head's voxels (1) with a face on what was not scanned, or on the grid's sides (left, right,
 // front, back; above and below the region of interest ends the model). Connected pieces of less
-// than 10 mm2 are none: a sharp edge by chance. `unscanned` may have no voxels; so has the result
-// where nothing is cut.
+// than 10 mm2 do not count: a sharp edge by chance. `unscanned` may have no voxels; the result has
+// no voxels where nothing is cut.
 LabelGrid CutVoxels(const LabelGrid& head, const LabelGrid& unscanned);
 
 // A connected piece of it.

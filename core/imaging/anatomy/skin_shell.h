@@ -14,10 +14,10 @@ namespace tissueform {
 LabelGrid ExposedTeeth(const HeadSegmentation& head, const LabelGrid& outside_air,
                        const Landmarks& landmarks);
 
-// The tissue behind the outer skin (core/imaging/anatomy/outer_skin.h): all voxels (1) that lie up
-// to `thickness_mm` behind it, whatever the CT has there. Where skin is thinner than that, this is
-// air of the nose or the mouth, or bone: the walls of a nose are 2 to 3 mm thin, and so is the skin
-// of its bridge. A model without them has no nose, or holes to the bone.
+// The tissue behind the outer skin (core/imaging/anatomy/outer_skin.h): all voxels (1) up to
+// `thickness_mm` behind it, regardless of the CT's values there. Where skin is thinner than that,
+// this is air of the nose or the mouth, or bone: the walls of a nose are 2 to 3 mm thin, and so is
+// the skin of its bridge. A model without them has no nose, or holes to the bone.
 //
 // Not behind the skin is air that reaches the outside by a straight way (the end of a nostril is
 // not plugged), and what lies behind teeth that are exposed in an open mouth, nor these.

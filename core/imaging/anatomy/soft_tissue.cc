@@ -95,10 +95,10 @@ LabelGrid BrainMarkers(const FloatGrid& depth, double neck_mm, const Eigen::Vect
   return markers;
 }
 
-// Brain and face hang together through the holes of the skull's base and where bone is thin: a
+// Brain and face are connected through the holes of the skull's base and where bone is thin: a
 // watershed of the depth parts them there. Closing the bone instead would take a ball as large as
 // the largest hole, and would close lips and eyelids with it; depth has its narrowest place in each
-// hole, whatever its size. Depths are in tenths of a mm, as the watershed floods whole numbers.
+// hole of any size. Depths are in tenths of a mm, as the watershed floods whole numbers.
 LabelGrid WithoutBrain(const LabelGrid& soft, double neck_mm, const Eigen::Vector3d& joint) {
   const FloatGrid depth = SignedDistanceMm(soft);
   VoxelGrid<int16_t> height(soft.geometry);

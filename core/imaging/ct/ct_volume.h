@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// Between slices that are farther apart than this nobody has seen what a plan would be made of.
+// Slices that are farther apart than this leave anatomy unseen that a plan would be built from.
 inline constexpr double kFarApartMm = 5;
 
 // A part of a CT in which its slices (or the voxels of another axis) lie far apart: between two

@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// Limits on what is read from outside. Defaults are told in docs/ct-input.md.
+// Limits on what is read from outside. docs/ct-input.md lists the defaults.
 struct CtReadLimits {
   int max_files = 20000;                        // in the folder, or in it and those below
   int max_folders = 2000;                       // below the folder that are searched

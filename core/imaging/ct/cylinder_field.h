@@ -11,12 +11,12 @@
 
 namespace tissueform {
 
-// The cylinder that a cone-beam scanner shows of a box whose rest has one value, whatever that is.
+// The cylinder that a cone-beam scanner shows of a box; the rest of the box has one constant value.
 // Found along any axis of the file: the four edges of the box along it have that value throughout,
 // and the columns that do not are a disc, or a disc that the sides of the box cut off. At its rim
 // at least four tenths of the voxels have another value: a round head in air that was cut off at
-// the lowest value is no such disc, as it does not reach its own outline in most slices. None where
-// there is no such cylinder. Its radius is 1.5 voxels less than that of the disc, whose rim
+// the lowest value is not such a disc, as it does not reach its own outline in most slices. Null
+// where there is no such cylinder. Its radius is 1.5 voxels less than that of the disc, whose rim
 // scanners blur. The result does not depend on the values' unit.
 std::optional<CylinderField> FindCylinderField(const CtVolume& volume);
 

@@ -122,7 +122,7 @@ std::vector<DicomHeader> FramesOf(const gdcm::DataSet& data, const DicomHeader& 
     frames.push_back(std::move(frame));
   });
   if (count == 0) return EvenFrames(data, file);
-  // More or fewer groups than frames: nobody knows which place is whose.
+  // More or fewer groups than frames: it is unknown which position belongs to which frame.
   if (IntegerOf(data, kNumberOfFrames) != count) return {};
   for (DicomHeader& frame : frames) frame.num_frames = count;
   return frames;

@@ -26,8 +26,8 @@ enum class DicomKind {
   kDeflated,   // its whole data set is compressed (1.2.840.10008.1.2.1.99)
   kNoImage,    // a report, a dose sheet
   kDirectory,  // DICOMDIR
-  kDamaged,    // begins as a DICOM file but is none to its end, is a CT image without size, or is
-               // only zeros
+  kDamaged,    // begins as a DICOM file but is not one to its end, is a CT image without size, or
+               // is only zeros
 };
 
 // The header of one image: of a file, or of a frame of a multi-frame file. Texts and UIDs, except

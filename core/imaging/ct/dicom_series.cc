@@ -169,7 +169,7 @@ bool MayBeJoined(const std::vector<Candidate>& candidates) {
   return true;
 }
 
-// How the user can say which is meant; several scans of one file cannot be told apart by it.
+// How the user can select one scan; a file's name does not distinguish several scans in it.
 std::string WaysToChoose(const std::vector<Candidate>& candidates) {
   std::set<std::optional<int>> numbers;
   std::set<int> files;

@@ -19,10 +19,10 @@ namespace tissueform {
 // Values of DICOM's tags, such as 0x00280010 for (0028,0010). They are taken as text and read
 // strictly: a header may hold anything. In a helper program only. Internal to core/imaging/ct.
 
-// Without spaces and zeros about it; empty where there is none.
+// Without spaces and zeros about it; empty if the tag is missing.
 std::string TextOf(const gdcm::DataSet& data, uint32_t tag);
 
-// A tag of type US; 0 where there is none.
+// A tag of type US; 0 if the tag is missing.
 int ShortOf(const gdcm::DataSet& data, uint32_t tag);
 
 std::optional<int> IntegerOf(const gdcm::DataSet& data, uint32_t tag);

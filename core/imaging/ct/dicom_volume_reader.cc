@@ -69,8 +69,8 @@ int DropCopies(int64_t max_bytes, std::vector<DicomHeader>* files) {
   return copies;
 }
 
-// A slice that nobody can read is missing from the stack, and it would be wrong to interpolate it
-// in silence.
+// A slice that cannot be read is missing from the stack, and it would be wrong to interpolate it
+// silently.
 absl::Status CheckNoneDamaged(const std::vector<DicomHeader>& files, const DicomStack& stack) {
   if (stack.slice_origins_mm.empty()) return absl::OkStatus();
   for (const DicomHeader& file : files) {
@@ -199,7 +199,7 @@ void TakeSlice(const DicomHeader& slice, const float* image, size_t k, double of
   }
 }
 
-// Each file is read once, whatever the order of its frames.
+// Each file is read once, in any order of its frames.
 absl::Status ReadSlices(const DicomStack& stack, double offset, int64_t max_bytes,
                         CtVolume* volume) {
   std::map<int, std::vector<size_t>> slices_of_file;

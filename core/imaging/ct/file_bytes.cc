@@ -86,7 +86,7 @@ absl::StatusOr<std::string> ReadWholeFile(const std::string& path, int64_t* byte
 }
 
 // Counted and thrown away, a chunk at a time, and no further than is enough: a few kilobytes may
-// unpack to as many gigabytes as whoever packed them liked.
+// unpack to any number of gigabytes.
 int64_t UnpackedSize(absl::string_view packed, int64_t enough) {
   enough += static_cast<int64_t>(kChunk);
   Inflater inflater(kGzipOrZlib);

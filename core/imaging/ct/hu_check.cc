@@ -18,9 +18,9 @@ constexpr int kLowest = -1024;
 constexpr int kHighest = 32767;
 constexpr int kBinWidth = 16;
 constexpr size_t kNumBins = (kHighest - kLowest) / kBinWidth + 1;
-// HU cannot be told from other numbers one by one, but a body in air has a shape: some air below
-// half of water's, some matter above fat's. A thousandth of the voxels is less than any head's
-// share of either and more than a few damaged pixels.
+// Single values do not show whether they are HU, but a body in air has a shape: some air below half
+// of water's, some matter above fat's. A thousandth of the voxels is less than any head's share of
+// either and more than a few damaged pixels.
 constexpr int kAirBelow = -500;
 constexpr int kMatterFrom = -200;
 constexpr double kLeastShare = 0.001;

@@ -25,8 +25,8 @@ struct ResampleOptions {
 // Where the grid is coarser than the volume, the value is the mean over the new voxel: of n samples
 // along each axis, where n = ceil(spacing / distance of the volume's samples along that axis), at
 // most
-// 8. A linear function of position is so reproduced exactly (to the rounding to whole HU), whatever
-// the volume's direction.
+// 8. A linear function of position is so reproduced exactly (to the rounding to whole HU), for any
+// direction of the volume.
 //
 // Errors: InvalidArgument unless spacing_mm is in [0.1, 10]; ResourceExhausted beyond max_bytes.
 absl::StatusOr<HuGrid> ResampleIsotropic(const CtVolume& volume, double spacing_mm,

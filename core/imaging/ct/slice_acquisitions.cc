@@ -153,7 +153,7 @@ class Separator {
     found_ = Parting{std::move(scans), told_by};
   }
 
-  // Two at one place cannot be told apart by it.
+  // Positions do not distinguish two slices at one place.
   void TryPlaces() {
     const std::vector<bool> in_it = OnRegularSteps(stack_);
     std::vector<Stack> scans(2);

@@ -44,7 +44,7 @@ class Slice {
         hu_(volume.hu.data() + int64_t{k} * width_ * height_),
         filled_(filled) {}
 
-  // Whether tissue ends on the filling. No pixel is filled where there is none.
+  // Whether tissue ends on the filling. Without a filling no pixel is marked.
   bool Fill() {
     FloodFromBorder();
     const auto same = [](int16_t from, int16_t to) { return from == to; };

@@ -28,7 +28,7 @@ namespace tissueform {
 // only what the nearest other slice below or above has as filling counts, and 4 pixels around it.
 // `metal` is 1 where a voxel is metal, laid out as `hu` of the volume; empty without metal.
 //
-// Outside of `volume.field`, where it is known, nothing was scanned, whatever its value.
+// Outside of `volume.field`, where it is known, nothing was scanned, regardless of its value.
 //
 // The result does not depend on `threads`.
 std::vector<uint8_t> FindUnscanned(const CtVolume& volume, int threads,

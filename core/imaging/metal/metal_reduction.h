@@ -16,7 +16,7 @@ namespace tissueform {
 
 // Key `metal` of the recipe.
 struct MetalOptions {
-  bool correct = true;                 // false: metal is neither looked for nor lessened
+  bool correct = true;                 // false: metal is not looked for, nor its streaks reduced
   std::optional<double> threshold_hu;  // above it a voxel is metal; found from the CT if not given
 };
 
@@ -40,15 +40,15 @@ struct MetalReport {
   bool any() const { return !clusters.empty(); }
 };
 
-// Lessens the streaks of metal, slice by slice, from the reconstructed slices alone
-// (core/imaging/metal/slice_correction.h), in place. Slices without metal, and of a volume without
-// metal all, stay as they are to the bit. Metal keeps its values; dead voxels inside it get 3000
-// HU.
+// Reduces the streaks of metal, slice by slice, from the reconstructed slices alone
+// (core/imaging/metal/slice_correction.h), in place. Slices without metal, and all slices of a
+// volume without metal, stay the same to the bit. Metal keeps its values; dead voxels inside it get
+// 3000 HU.
 //
 // The result does not depend on `threads`.
 MetalReport ReduceMetalArtifacts(const MetalFindings& findings, int threads, CtVolume* volume);
 
-// A CT on upright cubic voxels, its metal found and its streaks lessened.
+// A CT on upright cubic voxels, with its metal found and its streaks reduced.
 struct CtWithMetal {
   HuGrid hu;
   // 1 where a quarter of the voxel or more is metal; without voxels where there is no metal.

@@ -44,8 +44,9 @@ class MetalSlice {
 // between those classes stay between them, so that the rays along an edge are those of the slice.
 //
 // `interpolated` is the slice corrected with a prior of nothing: without streaks, but also without
-// whatever metal shades from all sides. What it shows as tissue is not air, nor bone of up to 500
-// HU: so dark is a shadow between two fillings, and so bright a streak. Denser bone, teeth, stays.
+// anything that metal shades from all sides. What it shows as tissue is not air, nor bone of up to
+// 500 HU: so dark is a shadow between two fillings, and so bright a streak. Denser bone, teeth,
+// stays.
 std::vector<float> MakePrior(const std::vector<float>& densities,
                              const std::vector<float>& interpolated, const SliceShape& shape,
                              double smooth_mm);

@@ -47,7 +47,7 @@ struct ImageHeader {
   std::optional<Eigen::Matrix<double, 3, 2>> axes = {};  // along a row, along a column
   std::optional<Eigen::Vector2d> pixel_spacing_mm = {};  // between rows, between columns
   std::optional<double> slice_thickness_mm = {};
-  std::optional<double> rescale_slope = {};  // to Hounsfield units; without these there are none
+  std::optional<double> rescale_slope = {};  // to HU; without slope and intercept HU are unknown
   std::optional<double> rescale_intercept = {};
   std::string rescale_type = {};
 };

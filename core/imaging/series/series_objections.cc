@@ -20,7 +20,7 @@ namespace {
 constexpr double kSameMm = 0.01;
 
 std::string OtherModality(const std::string& modality) {
-  // Of a header: only what is a modality by its form is told again.
+  // From a header: only a value in the form of a modality is repeated in the message.
   const bool is_name =
       modality.size() <= 16 && std::all_of(modality.begin(), modality.end(), [](unsigned char c) {
         return absl::ascii_isupper(c) || absl::ascii_isdigit(c);

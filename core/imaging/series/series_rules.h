@@ -33,7 +33,7 @@ struct SeriesRule {
   bool hounsfield = true;  // whether values must be known as Hounsfield units
   bool derived = false;    // whether reformatted series are taken
   bool contrast = true;    // whether series with contrast medium are taken
-  std::vector<std::string> description_has = {};    // one of these words, whatever their case
+  std::vector<std::string> description_has = {};    // one of these words, in any letter case
   std::vector<std::string> description_lacks = {};  // none of these
   std::vector<SeriesPreference> prefer = {
       SeriesPreference::kSoftKernel, SeriesPreference::kThinSlices, SeriesPreference::kNoContrast,

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-// This folder includes the standard library only, so that whoever has prepared answers as bytes can
-// evaluate them without what made them. docs/prepared-answers.md tells the same in words.
+// This folder includes the standard library only, so that programs can evaluate prepared answers as
+// bytes without the code that made them. docs/prepared-answers.md describes the same in words.
 namespace tissueform {
 
 enum class AnswerModel { kGradientField = 1, kLinearElastic = 2, kNeoHookean = 3 };

@@ -18,9 +18,9 @@ bool AreLegal(const PortableAnswers& answers, std::span<const AnswerPose> poses)
 // what was asked for. The edge of the range belongs to it.
 bool AreCovered(const PortableAnswers& answers, std::span<const AnswerPose> poses, double error_mm);
 
-// Beyond this turn there is no band, whatever was asked for. It is of first order in linear
+// Beyond this turn there is no band, regardless of the request. It is of first order in linear
 // elasticity, which takes a turn by a for a strain of 1 - cos(a): 13 % here, as much as tissue is
-// strained by an operation. What stiffness does to that strain says nothing of the face.
+// strained by an operation. What stiffness does to that strain says nothing about the face.
 inline constexpr double kLargestBandRotationRad = 0.524;  // 30 degrees
 
 // Whether a handle that turns so far has a band in answers that were prepared for turns up to

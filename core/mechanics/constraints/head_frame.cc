@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 constexpr double kDegree = M_PI / 180;
 // Of a frame's axes; files hold ten digits and more.
 constexpr double kAxesTolerance = 1e-6;
-// The cosine of a pitch below which roll and yaw cannot be told apart: an error of so many radians.
+// The cosine of a pitch below which roll and yaw cannot be separated: an error of so many radians.
 constexpr double kGimbalCosine = 1e-7;
 
 }  // namespace

@@ -70,7 +70,7 @@ std::string NameOf(int region, const ConstraintSet& constraints) {
                             "\"");
 }
 
-// Where a point at rest comes to lie as somebody sees it who goes with a region by `frame`.
+// The position of a point at rest, after `pose`, in the frame that moves with a region by `frame`.
 Eigen::Vector3d SeenFrom(const HandlePose& frame, const HandlePose& pose,
                          const Eigen::Vector3d& point) {
   const Eigen::Vector3d x = ApplyPose(pose, point) - frame.translation_mm - frame.pivot_mm;

@@ -31,7 +31,7 @@ enum class Termination {
 // "iterations", "no_room", "arithmetic", "blocked"; empty for kConverged.
 absl::string_view TerminationName(Termination gave_up);
 
-// How an answer was found. Not reaching a tolerance is told here; it is not an error.
+// How an answer was found. A tolerance that was not reached is reported here; it is not an error.
 struct SolveSummary {
   int iterations = 1;    // linear solves
   int newton_steps = 0;  // of them those with a new factor
@@ -50,11 +50,11 @@ struct SolveSummary {
   // What stands in the way, a sentence without its full stop that names handles; empty where
   // nothing does.
   std::string obstacle;
-  int64_t second_factor_bytes = 0;  // that the search took meanwhile
+  int64_t second_factor_bytes = 0;  // held only during the search
   // Found by prepared answers (VertexResponse), and how far it may then lie from the direct one.
   bool prepared = false;
   double error_bound_mm = 0;
-  // The same of models whose error nobody can bound: an estimate, and error_bound_mm is 0.
+  // The same for models whose error has no known bound: an estimate, and error_bound_mm is 0.
   double error_estimate_mm = 0;
 };
 
@@ -102,7 +102,7 @@ struct PreparationSummary {
   double assemble_seconds = 0;
   double analyse_seconds = 0;
   double factorise_seconds = 0;
-  double prepare_seconds = 0;  // harmonic fields and whatever else a model makes ready
+  double prepare_seconds = 0;  // harmonic fields and everything else that a model makes ready
   int64_t factor_bytes = 0;
   int64_t bytes_held = 0;  // everything that the deformer needs, shared parts included
   int64_t own_bytes = 0;   // of it what it holds beside the shared preparation

@@ -65,7 +65,7 @@ void EquilibriumSearch::Accept(Trial* trial) {
   const double free2 = free_gradient_.squaredNorm();
   const double reaction = std::sqrt(std::max(0.0, gradient_.squaredNorm() - free2));
   // Against the reactions, so that the tolerance means the same for soft and stiff, large and
-  // small. The force unit keeps it a number at rest, where there are none.
+  // small. The force unit keeps it a number at rest, where the reactions are 0.
   residual_ = std::sqrt(free2) / (reaction + force_unit_);
 }
 

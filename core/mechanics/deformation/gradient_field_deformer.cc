@@ -155,7 +155,7 @@ class GradientFieldDeformer : public Deformer {
     Deformation deformation;
     SolveSummary& summary = deformation.summary;
     summary.converged = false;
-    // Positions are made only where somebody sees them.
+    // Positions are computed only when a caller reads them.
     const auto report = [&](const ContactReconstruction::Answer& answer) {
       summary.solve_seconds = stopwatch.Seconds();
       summary.residual = last_residual_;

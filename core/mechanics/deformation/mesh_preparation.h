@@ -61,8 +61,8 @@ absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
 
 // What the models on one mesh, one stiffness and one constraint set share: operators, orderings and
 // factors. Each is made when a model first asks for it and never again, so switching the model does
-// not factorise what exists. Held by every deformer made from it. Made by one thread at a time;
-// what was made is constant, and deformers of several threads may use it meanwhile.
+// not factorise what exists. Held by every deformer made from it. Made by one thread at a time; the
+// finished parts are constant, and deformers on several threads may use them concurrently.
 class MeshPreparation {
  public:
   // Checks, and factorises nothing yet. `stiffness` is Young's modulus per tet in Pa, #T.

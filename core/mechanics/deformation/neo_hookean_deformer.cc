@@ -111,7 +111,7 @@ bool UsesRoundedFactor(const ElasticSystem& elastic) {
          elastic.condition_estimate() <= kLargestRoundedCondition;
 }
 
-// The closed rows of contact before an exchange, and how often it was told.
+// The closed rows of contact before an exchange, and how many more exchanges are allowed.
 struct ExchangeRun {
   size_t fewest_violations = std::numeric_limits<size_t>::max();
   int patience = kBlockPatience;

@@ -46,7 +46,7 @@ struct NeoHookeanOptions {
 //
 // Contact rows hold as in TurningContact: the normals of a handle's bone turn with it. The search
 // begins with the rows that touch in the linear answer and keeps them closed; where an equilibrium
-// is nearly found rows that pull are opened and rows that penetrate closed, until there are none by
+// is nearly found, rows that pull are opened and rows that penetrate closed, until none does so by
 // more than 0.001 mm. Bilateral rows hold to rounding in every state. Newton steps are not taken
 // with contact: what L-BFGS does not find is not found.
 //

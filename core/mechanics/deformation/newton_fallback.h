@@ -22,10 +22,10 @@ class StagnationDetector {
  public:
   explicit StagnationDetector(int patience) : patience_(patience) {}
 
-  // Begins anew: at another state, or with another patience.
+  // Starts again: at another state, or with another patience.
   void Restart(int patience) { *this = StagnationDetector(patience); }
 
-  // To be told the residual before every iteration.
+  // Call it with the residual before every iteration.
   bool HasStalled(double residual) {
     if (residual <= 0.5 * mark_) {
       mark_ = residual;

@@ -17,7 +17,7 @@ enum class ElasticLaw {
   kNeoHookean,  // that of NeoHookeanEnergy: sigma = mu J^(-5/3) dev(F F^T) + K (J - 1) I
 };
 
-// What a body bears in a state of deformation, whoever has found it.
+// What a body bears in a state of deformation, computed by any model.
 struct ElasticState {
   // Cauchy's stress sigma as sqrt(3/2) |dev sigma|, #T, Pa. (The linear model has one stress; a
   // large rotation shows in it.)

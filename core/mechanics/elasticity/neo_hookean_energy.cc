@@ -58,8 +58,8 @@ NeoHookeanEnergy::Value NeoHookeanEnergy::Evaluate(const Positions& displacement
           EvaluateTets(displacements, first, std::min(first + kTetGrain, num_tets));
     }
   });
-  // Block after block, whatever thread has done which: the line search compares energies to 1e-13,
-  // so their last digits must not depend on the threads.
+  // Block after block, regardless of which thread computed which: the line search compares energies
+  // to 1e-13, so their last digits must not depend on the threads.
   Value whole;
   whole.smallest_volume_ratio = std::numeric_limits<double>::infinity();
   for (const Value& block : blocks_) {

@@ -42,7 +42,7 @@ class NeoHookeanEnergy {
   static int64_t BytesNeeded(Eigen::Index num_tets);
 
  private:
-  // Energies and volumes of a run of tets, which the same blocks sum up whatever the threads.
+  // Energies and volumes of a run of tets; the same blocks sum them up for any number of threads.
   Value EvaluateTets(const Positions& displacements, Eigen::Index begin, Eigen::Index end);
   void GatherLoads(Positions* gradient) const;
 

@@ -178,7 +178,7 @@ Eigen::MatrixXd ThirdOrderForces(const PiecewiseLinearElements& elements,
       AddLane(elements, tet, tet - begin, batch, &forces);
     }
   }
-  // In place: these are the largest of all that is held meanwhile.
+  // In place: these matrices are the largest objects that are alive here.
   const Eigen::PartialPivLU<Eigen::MatrixXd> cubics(CubicsAtDirections(first.cols()));
   forces = cubics.permutationP() * forces;
   cubics.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(forces);

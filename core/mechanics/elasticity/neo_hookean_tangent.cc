@@ -41,7 +41,7 @@ Eigen::Matrix3d DeformationGradient(const PiecewiseLinearElements& elements,
   return Eigen::Matrix3d::Identity() + edges * gradients.transpose();
 }
 
-// Without its negative eigenvalues; untouched to the bit when there are none.
+// Without its negative eigenvalues; untouched to the bit when all are positive or zero.
 Eigen::Matrix3d WithoutNegative(const Eigen::Matrix3d& symmetric) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(symmetric);
   if (solver.eigenvalues()[0] >= 0) {

@@ -32,7 +32,7 @@ SparseMatrix NeoHookeanTangent(const PiecewiseLinearElements& elements,
                                double poisson_ratio, const Positions& displacements,
                                TangentForm form, int threads);
 
-// What making one holds beside the matrix itself.
+// The memory that computing a tangent takes in addition to the matrix itself.
 int64_t NeoHookeanTangentWorkspaceBytes(Eigen::Index num_tets);
 
 }  // namespace tissueform

@@ -24,11 +24,11 @@ class BlasThreadsScope {
   BlasThreadsScope& operator=(const BlasThreadsScope&) = delete;
 };
 
-// OpenBLAS chooses its kernels when it is loaded, by the model of the processor. One that is newer
-// than itself it takes for one of 2004 (Prescott), with kernels that need twice as long. Where
-// that is so, and the processor has AVX2 and FMA, this starts the program anew with the kernels for
-// those (Haswell), unless the environment chooses (OPENBLAS_CORETYPE); else it returns. The first
-// call in main, with its argv.
+// OpenBLAS chooses its kernels when it is loaded, by the model of the processor. It takes a
+// processor newer than itself for one of 2004 (Prescott), with kernels that need twice as long. In
+// that case, if the processor has AVX2 and FMA, this restarts the program with the kernels for
+// those (Haswell), unless the environment chooses (OPENBLAS_CORETYPE); otherwise it returns. The
+// first call in main, with its argv.
 void RestartWithFittingBlasKernels(char** argv);
 
 }  // namespace tissueform

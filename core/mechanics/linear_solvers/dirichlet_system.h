@@ -26,8 +26,8 @@ struct FactorizationSummary {
 };
 
 // Called after the symbolic analysis with the bytes that the numeric factor will need and before
-// they are allocated. An error stops the preparation and is returned as it is: the place where a
-// memory budget says no. (Whether anybody still waits is asked of a Cancellation.)
+// they are allocated. An error stops the preparation and is returned as it is: here a memory budget
+// can refuse. (A Cancellation says whether a caller still waits.)
 using FactorAdmission = std::function<absl::Status(int64_t factor_bytes)>;
 
 // K x = b with prescribed values at some unknowns (Liao et al. 2009, Eq. 7): rows and columns of

@@ -24,7 +24,7 @@ constexpr double kTellingOfSlopes = 0.1;
 constexpr double kTellingOfCurvature = 0.3;
 // Of the sum: what it cannot tell, because residuals are of single precision.
 constexpr double kRounding = 1e-7;
-// Of the sum that the slopes promise: when a step wins less, they are taken anew.
+// Of the sum that the slopes promise: when a step wins less, they are computed again.
 constexpr double kLeastOfPromise = 0.5;
 // In shortest steps.
 constexpr double kSlopesHold = 100;

@@ -40,11 +40,11 @@ struct LeastSquaresSolution {
 
 // Levenberg-Marquardt; each step is the exact answer of the damped linear problem within the
 // bounds (an active-set method), so that bounds are kept at every x that counts and a step along
-// them is as good as one inside. Slopes take two evaluations for every unknown, so they are learned
-// from steps (Broyden) and taken anew where a step wins less than they promised and at the end; and
-// the residuals' own bending is learned from slopes (Dennis, Gay and Welsch). Ends where no step
-// lowers the sum by more than 1e-7 of it, which is what single precision tells. From `start`, which
-// is moved within the bounds.
+// them is as good as one inside. Slopes take two evaluations for every unknown, so they are updated
+// from steps (Broyden), and computed again at the end and where a step wins less than promised; the
+// residuals' own curvature is estimated from slopes (Dennis, Gay and Welsch). Ends where no step
+// lowers the sum by more than 1e-7 of it, the limit of single precision. From `start`, which is
+// moved within the bounds.
 LeastSquaresSolution SolveBoundedLeastSquares(const LeastSquaresProblem& problem,
                                               const Eigen::VectorXd& start);
 

@@ -33,7 +33,7 @@ class BoxProgram {
   }
 
   VectorXd Solve() {
-    // A variable may come and go; rounding may let two change places for ever.
+    // A variable may come and go; rounding may let two change places endlessly.
     const Index most_rounds = 20 * (g_.size() + 1);
     for (Index round = 0; round < most_rounds; ++round) {
       if (GoToMinimumOfFree() && !ReleaseOne()) break;

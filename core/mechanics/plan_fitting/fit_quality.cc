@@ -34,9 +34,9 @@ std::vector<size_t> MainUnknowns(const VectorXd& movement_of_unknowns) {
 
 }  // namespace
 
-// In the coordinates z = C' x, C C' = M the movement of the free unknowns, 1 is 1 mm of bone
-// whatever moves. There J = U S V', the regularised answer is V diag(s / (s^2 + l^2)) U' of what is
-// wanted, and diag(s^2 / (s^2 + l^2)) is the part of it that the targets decide.
+// In the coordinates z = C' x, C C' = M the movement of the free unknowns, 1 is 1 mm of bone in
+// any direction. There J = U S V', the regularised answer is V diag(s / (s^2 + l^2)) U' of the
+// targets, and diag(s^2 / (s^2 + l^2)) is the part of it that the targets decide.
 FitQuality MeasureFitQuality(const MatrixXd& jacobian, const MatrixXd& movement,
                              const std::vector<ActiveBound>& bounds, double less_movement) {
   FitQuality quality;

@@ -12,11 +12,11 @@
 
 namespace tissueform {
 
-// How well the targets tell one unknown. What is said of bounds: an unknown that one holds is not
-// asked about, and the others are told as if it were known.
+// How well the targets determine one unknown. Bounds: an unknown at a bound is not evaluated, and
+// the others are evaluated as if it were known.
 struct Determination {
   // The part of it that the targets decide, 0 to 1; the rest is decided by moving least: by how
-  // much they lessen the variance that the wish to move little leaves to it.
+  // much they reduce the variance that the preference for small movements leaves to it.
   double by_targets = 0;
   // By how much (rad or mm) it would differ, one standard deviation, were every number that is
   // wanted off by 1 mm (of weight 1; a weight of 4 stands for half a mm), independently.

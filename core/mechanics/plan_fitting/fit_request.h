@@ -33,7 +33,7 @@ inline constexpr double kMaxTargetWeight = 1e6;
 // What is wanted of one point, in the axes of the request.
 struct FitTargetRequest {
   std::string name;
-  // Where the point is at rest: a point on the skin, or the mean of vertices where there is none.
+  // Where the point is at rest: a point on the skin; without one, the mean of the vertices.
   std::optional<Eigen::Vector3d> point_mm = std::nullopt;
   std::vector<int32_t> vertices = {};
   // One of: where it is to be; which way and how far it is to go; how far along a direction of any
@@ -67,7 +67,7 @@ struct FitRequest {
   double tolerance_mm = 0.5;  // a target that is missed by more is not reached
 };
 
-// What can be told of a request without mesh and plan.
+// Checks what can be checked of a request without mesh and plan.
 //
 // Errors: InvalidArgument, in one line that names the target or the handle: no target, more of them
 // than kMaxFitTargets or of vertices than kMaxFitVertices, a name twice; a number that is not

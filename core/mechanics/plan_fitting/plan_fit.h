@@ -71,7 +71,7 @@ struct PlanFit {
 // Finds the unknowns of the problem. `response`: prepared answers at FitVertices, of the mesh and
 // constraints that the problem was put upon.
 //
-// That a target cannot be reached is no error: it is told.
+// An unreachable target is not an error: the result reports it.
 //
 // Errors: those of the full model; Cancelled.
 absl::StatusOr<PlanFit> FitPlan(const FitProblem& problem, const TetMesh& mesh,

@@ -57,7 +57,7 @@ NearestSkin SkinFacets::Nearest(const Vector3d& place) const {
   nearest.distance_mm = std::numeric_limits<double>::infinity();
   for (Index f = 0; f < facets_.rows(); ++f) {
     const Vector3d a = positions.row(facets_(f, 0));
-    // Most facets are told to be too far by one of their corners.
+    // Checking one corner is enough to see that most facets are too far.
     if ((place - a).norm() - longest_edges_mm_[f] > nearest.distance_mm) continue;
     const Vector3d b = positions.row(facets_(f, 1));
     const Vector3d c = positions.row(facets_(f, 2));

@@ -160,7 +160,7 @@ class NeoHookeanBuilder {
     answers_.numbers.cut_per_mm = kCutAllowance * worst;
   }
 
-  // Those that are not covered are made smaller until they are: nobody asks for the rest.
+  // Samples that are not covered are made smaller until they are: poses beyond are never evaluated.
   std::vector<std::vector<HandlePose>> CoveredSamples(const PoseRange& range, int count) const {
     constexpr double kSmaller = 0.8;
     std::vector<std::vector<HandlePose>> samples = SamplePoses(centroids_, range, count);

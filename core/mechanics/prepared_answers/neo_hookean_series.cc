@@ -76,7 +76,7 @@ MatrixXd QuadraticFields(const ElasticSystem& elastic, const Eigen::Vector3d& ce
   return elastic.response_columns() * coefficients;
 }
 
-// What is told of the passes over the factor, and asked before each.
+// Progress of the passes over the factor is reported here; cancellation is checked before each.
 struct Passes {
   const PreparationObserver& observer;
   const Cancellation& cancellation;

@@ -32,7 +32,7 @@ struct ResponseBasisOptions {
 struct ResponseBasisPlan {
   int degree = 0;     // largest total degree of the polynomials
   int num_terms = 0;  // columns: 3 for every polynomial and 4 for every handle, to be compressed
-  int64_t bytes = 0;  // that making the basis takes at most
+  int64_t bytes = 0;  // that computing the basis takes at most
 };
 
 // A basis of more polynomials than this is refused: it would be slower than the direct solve.

@@ -22,8 +22,8 @@ struct SimplexDomain {
   Eigen::VectorXd FromUnit(const Eigen::VectorXd& y) const { return low + width * y; }
 };
 
-// The smallest of them that holds all rows of `values`, and the unit simplex, which keeps rounding
-// from making it empty. Nothing is ever extrapolated.
+// The smallest of them that holds all rows of `values` and the unit simplex, which ensures that the
+// result is not empty after rounding. Nothing is ever extrapolated.
 SimplexDomain EnclosingSimplex(const Eigen::Ref<const Eigen::MatrixXd>& values);
 
 // Polynomials of total degree up to `degree` on the unit simplex { y >= 0, sum y <= 1 } of k

@@ -37,7 +37,7 @@ class VertexResponse {
   // vertices.
   double ErrorBoundMm(absl::Span<const HandlePose> poses) const;
 
-  // Whether what is called a bound here is an estimate: of models whose error nobody can bound.
+  // Whether what is called a bound here is an estimate: for models whose error has no known bound.
   bool error_is_estimate() const;
 
   // Whether the bound is within the tolerance that was asked for, and the poses within the prepared

@@ -51,7 +51,7 @@ enum class ContactUse {
 
 // A plan put upon its mesh: all that a deformer or a session needs, whether it was read from files
 // (core/planning) or has just been built (core/planning/plan_building). Everything is in LPS,
-// whatever the plan's own coordinate system was.
+// regardless of the plan's own coordinate system.
 struct PlanProblem {
   std::shared_ptr<const TetMesh> mesh;
   std::vector<Attribute> point_data;  // of the mesh file, kept for the result

@@ -25,8 +25,8 @@ namespace tissueform {
 // Constant: any number of threads may ask at once.
 class BandColumns {
  public:
-  // `vertices` are numbers of the mesh's. `admission`, which may be empty, is asked for what the
-  // columns take and what making them takes on top.
+  // `vertices` are numbers of the mesh's. `admission`, which may be empty, is asked for the memory
+  // of the columns and the additional memory that computing them takes.
   //
   // Errors: those of ExpandLinearElastic, or what the admission says.
   static absl::StatusOr<std::unique_ptr<BandColumns>> Create(

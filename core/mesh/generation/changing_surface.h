@@ -72,7 +72,7 @@ class ChangingSurface {
   // REQUIRES: CanFlip.
   void Flip(int32_t h);
 
-  // What is left, numbered anew in the same order.
+  // What is left, renumbered in the same order.
   TriangleMesh Compact() const;
 
  private:

@@ -20,7 +20,7 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 using Box = CGAL::Box_intersection_d::Box_with_info_d<double, 3, int32_t>;
 
-// Ends CGAL's search, which cannot be told to stop.
+// Ends CGAL's search, which has no way to stop it.
 struct EnoughPairs {};
 
 struct Corner {

@@ -50,8 +50,8 @@ bool BeginsElements(absl::string_view line) {
   return absl::StartsWith(line, "$Elements") || absl::StartsWith(line, "$ELM");
 }
 
-// The text with the elements numbered from 1. Some programs (SOFA) give all the same number, and
-// Gmsh then keeps only one of them.
+// The text with the elements numbered from 1. Some programs (SOFA) give all elements the same
+// number, and Gmsh then keeps only one of them.
 std::string Renumber(absl::string_view text) {
   std::string result;
   int64_t number = -1;  // of the line in the elements, whose line 0 is the count

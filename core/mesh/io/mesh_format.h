@@ -20,8 +20,8 @@ enum class MeshKind { kTets, kTriangles };
 absl::StatusOr<MeshFormat> SurfaceFormatOfPath(const std::string& path);
 
 // Finds the format by the ending, in any case (VTK's two formats for tets by content), and checks
-// what can be told without a library: the file is there, is a file, is within the limits, begins as
-// its format does and, where the format has an end mark, ends with it. For TetGen's pairs `path`
+// what can be checked without a library: the file is there, is a file, is within the limits, begins
+// as its format does and, where the format has an end mark, ends with it. For TetGen's pairs `path`
 // may name either file.
 //
 // Errors: NotFound, PermissionDenied, ResourceExhausted (over a limit), InvalidArgument (another

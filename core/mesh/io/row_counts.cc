@@ -42,7 +42,7 @@ const Section* FindSection(absl::string_view word) {
   return nullptr;
 }
 
-// How many numbers the line holds, or -1 when something in it is none.
+// How many numbers the line holds, or -1 when a word in it is not a number.
 int CountNumbers(absl::string_view line) {
   int count = 0;
   for (const absl::string_view word :

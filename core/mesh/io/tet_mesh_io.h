@@ -15,7 +15,7 @@
 
 namespace tissueform {
 
-// Limits on what is read from outside. Defaults are told in docs/mesh-formats.md.
+// Limits on what is read from outside. docs/mesh-formats.md lists the defaults.
 struct MeshReadLimits {
   int64_t max_file_bytes = int64_t{4} << 30;
 

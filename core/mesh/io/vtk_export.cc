@@ -74,7 +74,7 @@ void AddNotice(vtkPointSet* data) {
   data->GetFieldData()->AddArray(notice);
 }
 
-// The same for somebody who looks into the file, where VTK's writer can put none.
+// The same for a person who opens the file as text; VTK's writer cannot write a comment.
 std::string WithNoticeAsComment(std::string xml) {
   const size_t end_of_declaration = xml.find("?>\n");
   if (end_of_declaration == xml.npos) return xml;
@@ -114,10 +114,10 @@ void AddPointsAndArrays(const Positions& positions, const std::vector<Attribute>
 absl::StatusOr<std::string> SerializeWith(vtkXMLWriter* writer, vtkPointSet* data) {
   VtkErrorScope errors;
   writer->SetInputData(data);
-  // In base64: raw bytes would take a quarter less, but such a file is no XML, and meshio 5.0,
-  // which puts it together anew by its offsets, takes one array for another where an old offset and
-  // a new one happen to be equal. At the end: inside its element VTK notes the range of an array,
-  // and its own reader refuses that note where a value is infinite.
+  // In base64: raw bytes would take a quarter less, but such a file is not XML, and meshio 5.0,
+  // which reassembles it by its offsets, takes one array for another where an old offset and a new
+  // one happen to be equal. At the end: inside its element VTK notes the range of an array, and its
+  // own reader refuses that note where a value is infinite.
   writer->SetDataModeToAppended();
   writer->EncodeAppendedDataOn();
   writer->SetCompressorTypeToZLib();

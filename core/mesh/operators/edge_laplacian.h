@@ -23,7 +23,7 @@ SparseMatrix AssembleEdgeLaplacian(const Eigen::Ref<const CellIndices>& cells,
                                    const Eigen::Ref<const CellEdgeWeights>& edge_weights,
                                    int threads);
 
-// Laplacian with weight one on every edge of the cells, whatever its length and angles: the uniform
+// Laplacian with weight one on every edge of the cells, of any length and angles: the uniform
 // guidance that the source compares with (Liao et al. 2009, Fig. 6b and d).
 SparseMatrix UniformLaplacian(const Eigen::Ref<const CellIndices>& cells, Eigen::Index num_vertices,
                               int threads);

@@ -9,8 +9,8 @@
 
 namespace tissueform {
 
-// .obj and .off: places and faces. VTK's OBJ reader gives a vertex anew to every face where a file
-// has normals or textures, which tears the surface apart; CGAL's keeps the vertices of the file.
+// .obj and .off: places and faces. VTK's OBJ reader gives every face its own copy of a vertex where
+// a file has normals or textures, which tears the surface apart; CGAL's keeps the file's vertices.
 // Polygons are split into triangles. Internal to core/mesh/readers.
 //
 // REQUIRES: one of these two formats.

@@ -126,7 +126,7 @@ int TetGridReader::CheckArrayHeaders(vtkXMLDataElement* section) {
 
 // Success is claimed even where the array is too short: on failure VTK 9.1 composes its message
 // from the PointData element without looking whether there is one. The defect is kept, so the file
-// is refused all the same.
+// is still refused.
 int TetGridReader::ReadArrayForCells(vtkXMLDataElement* element, vtkAbstractArray* array) {
   if (array == nullptr || Superclass::ReadArrayForCells(element, array) == 0) {
     Refuse(absl::StrCat("cell array \"", NameOf(element),

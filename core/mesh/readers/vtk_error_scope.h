@@ -17,7 +17,7 @@ class VtkErrorScope {
   VtkErrorScope(const VtkErrorScope&) = delete;
   VtkErrorScope& operator=(const VtkErrorScope&) = delete;
 
-  // The first error in one line, without source position and address; empty when there was none.
+  // The first error in one line, without source position and address; empty if no error occurred.
   const std::string& first_error() const { return first_error_; }
 
   // Called by VTK's output window.

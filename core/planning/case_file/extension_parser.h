@@ -19,8 +19,8 @@ namespace tissueform {
 // What a case and the viewer's surfaces beside a plan have in common. Values are of JSON that has
 // passed the schema.
 
-// The root's extension of that name. Errors: InvalidArgument: there is none, it breaks the schema,
-// or a text of it holds a control character (they go to terminals and pages).
+// The root's extension of that name. Errors: InvalidArgument: the extension is missing, it breaks
+// the schema, or a text of it holds a control character (they go to terminals and pages).
 absl::StatusOr<nlohmann::json> ParseExtension(const Glb& glb, const std::string& name,
                                               const JsonSchema& schema);
 
@@ -37,8 +37,8 @@ HeadFrame ParseHeadFrame(const nlohmann::json& json);
 absl::StatusOr<std::vector<CaseSurface>> ParseSurfaces(const Glb& glb, const nlohmann::json& json,
                                                        int64_t mesh_vertices);
 
-// InvalidArgument: a surface or landmark of a handle that is none of `handles`, a segment without
-// one, a landmark at a vertex that the skin has not.
+// InvalidArgument: a surface or landmark of a handle that is not in `handles`, a segment without
+// one, a landmark at a vertex that the skin does not have.
 absl::Status CheckReferences(const std::vector<CaseSurface>& surfaces,
                              const std::vector<CaseLandmark>& landmarks,
                              const std::vector<std::string>& handles);

@@ -138,8 +138,8 @@ class SkinParter {
     }
   }
 
-  // Of the other lip the nearest point that faces as the facet does which was followed before; with
-  // the same share. Where there is none the double follows as its vertex does.
+  // The double follows the nearest point of the other lip that faces the same way as the facet that
+  // was followed before, with the same share. Without such a point it follows as its vertex does.
   void Follow(int32_t vertex, Index row, const NearbyTriangles& nearby,
               const TriangleIndices& facets) {
     FollowedVertices& follows = *skin_.follows;

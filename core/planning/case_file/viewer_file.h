@@ -46,7 +46,7 @@ absl::StatusOr<ViewerFile> ParseViewer(absl::string_view bytes);
 // The same of a file; messages begin with its path. Errors: also NotFound.
 absl::StatusOr<ViewerFile> ReadViewer(const std::string& path);
 
-// The viewer file beside a mesh file; nothing where there is none. Errors: those of ReadViewer;
+// The viewer file next to a mesh file; nothing if it does not exist. Errors: those of ReadViewer;
 // FailedPrecondition when it belongs to another mesh.
 absl::StatusOr<std::optional<ViewerFile>> FindViewerOf(const std::string& mesh_path);
 

@@ -133,4 +133,20 @@ Agreement AgreementOf(const std::vector<double>& differences) {
   return agreement;
 }
 
+Eigen::Index BestSetting(const Eigen::MatrixXd& errors) {
+  Eigen::Index best = 0;
+  errors.colwise().sum().minCoeff(&best);
+  return best;
+}
+
+std::vector<Eigen::Index> BestSettingsOfOthers(const Eigen::MatrixXd& errors) {
+  std::vector<Eigen::Index> chosen;
+  for (Eigen::Index patient = 0; patient < errors.rows(); ++patient) {
+    Eigen::MatrixXd others = errors;
+    others.row(patient).setZero();
+    chosen.push_back(BestSetting(others));
+  }
+  return chosen;
+}
+
 }  // namespace tissueform

@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace tissueform {
 
 // Statistics of a cohort: one number a patient. Pure functions; the same numbers give the same
@@ -69,5 +71,15 @@ struct Agreement {
 
 // REQUIRES: at least two differences.
 Agreement AgreementOf(const std::vector<double>& differences);
+
+// The setting (column) with the smallest mean of `errors`, #patients by #settings; the first of
+// equals. REQUIRES: at least one patient and one setting, no NaN.
+Eigen::Index BestSetting(const Eigen::MatrixXd& errors);
+
+// Leave-one-out cross-validation: for each patient the best setting of all others, so that no
+// patient's error counts where a setting is chosen for that patient.
+//
+// REQUIRES: as BestSetting, and at least two patients.
+std::vector<Eigen::Index> BestSettingsOfOthers(const Eigen::MatrixXd& errors);
 
 }  // namespace tissueform

@@ -56,6 +56,7 @@ class Comparison {
                     .segments = {},
                     .opening = {},
                     .predictions = {},
+                    .by_settings = {},
                     .by_ratios = {},
                     .real_skin = real.mesh(),
                     .cautions = {}};
@@ -213,16 +214,38 @@ class Comparison {
     }
     std::ranges::move(planned, std::back_inserter(outcome->predictions));
     AddBaselines(real, outcome);
+    return options_.settings ? PredictBySettings(real, outcome) : absl::OkStatus();
+  }
+
+  absl::Status PredictBySettings(const SignedSurface& real, Outcome* outcome) const {
+    const Poses poses = PosesOf(*outcome, outcome->by_bone);
+    const std::vector<ModelSettings> settings = SettingsToTry(problem_);
+    SettingsDeformer deformer(problem_, options_.threads);
+    for (size_t s = 0; s < settings.size(); ++s) {
+      Tell(absl::StrFormat("predicting with settings %d of %d", s + 1, settings.size()));
+      TF_ASSIGN_OR_RETURN(const Deformation answer, deformer.Deform(settings[s], InOrder(poses)));
+      TF_ASSIGN_OR_RETURN(const PredictedCase predicted,
+                          PredictCase(contents_, answer.positions, poses));
+      outcome->by_settings.push_back({settings[s], CompareFaces(FaceOf(predicted), real)});
+    }
     return absl::OkStatus();
   }
 
-  absl::StatusOr<ComparedPrediction> PredictAndCompare(Deformer* deformer, const Poses& poses,
-                                                       const SignedSurface& real) const {
+  std::vector<HandlePose> InOrder(const Poses& poses) const {
     std::vector<HandlePose> in_order;
     for (const HandleRegion& handle : problem_.constraints.handles()) {
       in_order.push_back(poses.at(handle.name));
     }
-    TF_ASSIGN_OR_RETURN(const Deformation answer, deformer->Deform(in_order));
+    return in_order;
+  }
+
+  ComparedFace FaceOf(const PredictedCase& predicted) const {
+    return {predicted.surfaces[skin_].cast<double>(), Skin().triangles, Skin().regions};
+  }
+
+  absl::StatusOr<ComparedPrediction> PredictAndCompare(Deformer* deformer, const Poses& poses,
+                                                       const SignedSurface& real) const {
+    TF_ASSIGN_OR_RETURN(const Deformation answer, deformer->Deform(InOrder(poses)));
     TF_ASSIGN_OR_RETURN(const PredictedCase predicted,
                         PredictCase(contents_, answer.positions, poses));
     PlacedLandmarks near;
@@ -231,8 +254,7 @@ class Comparison {
         near[contents_.landmarks[i].name] = predicted.landmarks_mm[i];
       }
     }
-    ComparedPrediction prediction = Compared(
-        {predicted.surfaces[skin_].cast<double>(), Skin().triangles, Skin().regions}, near, real);
+    ComparedPrediction prediction = Compared(FaceOf(predicted), near, real);
     prediction.load = answer.summary.load;
     return prediction;
   }

@@ -39,7 +39,7 @@ Plane FrankfortHorizontal(const FrankfortLandmarks& frankfort, const Plane& mids
 // horizontal as far as it is square to it. REQUIRES: they are not parallel.
 HeadFrame FrameOfPlanes(const Plane& midsagittal, const Plane& horizontal);
 
-// What a head's frame is made from: planes that somebody has given, and what was found.
+// What a head's frame is made from: planes that the user has given, and what was found.
 struct HeadFrameSources {
   const Landmarks& landmarks;
   const std::optional<FrankfortLandmarks>& frankfort;

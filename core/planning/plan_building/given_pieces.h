@@ -25,7 +25,7 @@ struct SegmentFiles {
   std::vector<std::string> notes;  // on unit and axes, one sentence each
 };
 
-// Reads the surfaces and transforms of a recipe's segments; does nothing where there are none.
+// Reads the surfaces and transforms of a recipe's segments; does nothing if it names no such files.
 //
 // Errors: those of ReadMove and SurfaceReader::Read, with the segment's name.
 absl::StatusOr<SegmentFiles> ReadSegmentFiles(const Recipe& recipe, int threads);

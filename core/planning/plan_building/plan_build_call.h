@@ -60,10 +60,10 @@ struct PlanBuildAnswer {
   std::string defects;  // which it misses and by how much; empty when it is ready
 };
 
-// Fills request.folder, also with a plan that misses requirements. When this
-// function has returned nobody writes into the folder any longer; what an error leaves in it is the
-// caller's to take away (AtomicFolder does). Any thread may call it, many at once; when this
-// process dies, the work ends too.
+// Fills request.folder, also with a plan that misses requirements. When this function has returned,
+// no process writes into the folder; after an error, the caller removes what is left in it
+// (AtomicFolder does). Any thread may call it, many at once; when this process dies, the work ends
+// too.
 //
 // Errors: those of ReadRecipe, BuildPlan, WritePlan and WritePlanReport; Cancelled; Internal when a
 // library crashes, ResourceExhausted when the work is killed; NotFound when the program is not

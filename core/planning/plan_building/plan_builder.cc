@@ -45,7 +45,7 @@ class Progress {
     to_ = to;
     TellStage(tell_, stage, from);
   }
-  // What the parts of a stage are told by.
+  // The function that the parts of a stage report their progress to.
   StageFunction Parts() const {
     return [this](absl::string_view stage, double fraction) {
       TellStage(tell_, stage, from_ + (to_ - from_) * fraction);

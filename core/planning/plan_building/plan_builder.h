@@ -51,7 +51,7 @@ struct BuiltSegment {
 std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments);
 
 // A planning model with all that led to it: what is written, reported and drawn. BuildPlan makes it
-// whole, at the end, from what its stages return; there is none without its mesh.
+// whole, at the end, from what its stages return; it always has its mesh.
 struct PlanBuild {
   Recipe recipe;
   CtProvenance ct;
@@ -61,7 +61,7 @@ struct PlanBuild {
   Eigen::Vector3d ct_spacing_mm = Eigen::Vector3d::Zero();
   MetalReport metal;
   LabelGrid carried_skin = {};  // CtWithMetal::carried_skin
-  HuGrid before_correction;     // the resampled CT about the metal before its streaks were lessened
+  HuGrid before_correction;     // the resampled CT about the metal before its streaks were reduced
   HeadSegmentation head;        // its geometry is the resampled CT's
   BoneParts parts;
   LabelGrid bone;  // 0 none, 1 stays, 2.. the segments; on the head's grid

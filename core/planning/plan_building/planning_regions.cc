@@ -51,7 +51,7 @@ bool IsAir(const PlanningCt& ct, const Eigen::Vector3d& place) {
   return Interpolate(ct.hu, place) < ct.tissue_above_hu;
 }
 
-// The label of the nearest voxel that is no soft tissue; air where there is none near by.
+// The label of the nearest voxel that is not soft tissue; air if no such voxel is near.
 uint8_t NearestOther(const Eigen::Vector3d& place, const LabelGrid& labels, const PlanningCt& ct) {
   const auto voxel = NearestVoxel(labels, place, kSearchVoxels,
                                   [](uint8_t label) { return label != kSoftTissue; });

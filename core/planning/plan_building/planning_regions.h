@@ -50,17 +50,17 @@ struct PlanningRegions {
   int64_t freed_by_contact = 0;  // vertices on bone that were left free
 };
 
-// How far the farthest voxel with `label` moves, in mm; 0 when there is none.
+// How far the farthest voxel with `label` moves, in mm; 0 if no voxel has it.
 double LargestMoveMm(const LabelGrid& labels, uint8_t label, const HandlePose& pose);
 
 // A vertex of the boundary is on a cut where a plane of the region is nearer than 0.6 voxels, and
 // on what the nearest voxel outside the soft tissue is: bone that stays, a segment, or air.
 //
-// Where the scanner's circle cuts the head, a vertex is free, but no skin.
+// Where the scanner's circle cuts the head, a vertex is free, but is not skin.
 //
 // Bone is left free as `bands` say, and so are the vertices of tets that two different constraints
-// would hold all the same. Cuts nearer than three contact bands to a segment are left free, too:
-// they are no anatomy, and would hold the skin.
+// would otherwise still hold. Cuts nearer than three contact bands to a segment are left free, too:
+// they are not anatomy, and would hold the skin.
 //
 // `boundary_vertices` is the number of vertices of the mesh on its boundary, which come first.
 // Errors: InvalidArgument when the bands leave a segment or the fixed bone without vertices.

@@ -79,7 +79,7 @@ struct OuterSkin {
   std::optional<TriangleMesh> cut;  // what the scanner's circle or the CT's side makes of it
 };
 
-// The outer skin of the CT within the region of interest; teeth that an open mouth shows are none.
+// The outer skin of the CT within the region of interest, without teeth that an open mouth exposes.
 absl::StatusOr<OuterSkin> FindOuterSkin(const HeadSegmentation& head, const LabelGrid& outside_air,
                                         const Landmarks& landmarks, const RegionOfInterest& region,
                                         double tolerance_mm) {

@@ -130,7 +130,7 @@ absl::StatusOr<SoftTissueMesh> MeshSoftTissue(const VoxelGrid<float>& heights,
   TF_RETURN_IF_ERROR(CheckOptions(options));
   TF_RETURN_IF_ERROR(Announce(options, "surface of the soft tissue"));
   TF_ASSIGN_OR_RETURN(const TriangleMesh isosurface, Isosurface(heights, options));
-  absl::Status stopped;  // by the caller, whatever the error
+  absl::Status stopped;  // by the caller, independent of the returned error
   SoftTissueMeshOptions watched = options;
   watched.on_stage = [&](absl::string_view stage) { return stopped = Announce(options, stage); };
   double shrinking = 1;

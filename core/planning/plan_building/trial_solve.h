@@ -33,10 +33,10 @@ struct ContactRelaxation {
 // Widens the contact band where it is too narrow for the planned moves: deforms the mesh as planned
 // and by a third more, with gradient_field, linear_elastic and arap (neo_hookean never inverts a
 // tet), frees of the constrained vertices of inverted tets so few that each loses one, and again,
-// until no tet is inverted or after some rounds. Of an inverted tet without constrained vertices
+// until no tet is inverted or after some rounds. For an inverted tet without constrained vertices
 // the nearest ones are freed; but where gradient_field by a third more comes to such a tet, all is
-// done anew with it as planned only. What is narrow (the gap between teeth, the walls of a cut) is
-// so given way where it must be, and held elsewhere. Nothing is tried where nothing moves.
+// repeated with it as planned only. This releases narrow places (the gap between teeth, the walls
+// of a cut) where necessary, and holds them elsewhere. Nothing is tried where nothing moves.
 //
 // Returns the regions with those vertices freed. Errors: InvalidArgument when too little of a
 // segment or of the fixed bone would be left to hold it.

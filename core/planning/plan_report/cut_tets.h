@@ -11,8 +11,8 @@
 
 namespace tissueform {
 
-// The boundary of those tets whose barycentre lies on the positive side of the plane, coloured by
-// colours[t] of the tet t that a triangle belongs to. Empty where there is none.
+// The boundary of those tets whose barycenter is on the positive side of the plane, colored by
+// colours[t] of the tet t that a triangle belongs to. Empty if there are no such tets.
 SurfaceLayer CutTets(const TetMesh& mesh, const Plane& plane, const std::vector<Colour>& colours);
 
 }  // namespace tissueform

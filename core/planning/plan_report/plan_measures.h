@@ -20,7 +20,7 @@ struct PlanMeasures {
   int32_t components = 0;
   double ratio_to_voxels = 0;  // volume of the mesh to that of the soft tissue's voxels
   std::vector<double> smallest_dihedral_deg;  // of every tet
-  std::array<double, 4> bone_mm3 = {};        // by label of BoneParts; 0 is none
+  std::array<double, 4> bone_mm3 = {};        // by label of BoneParts; 0: no bone
   std::vector<int64_t> tets_of_tissue;        // by place in the table of tissues
   std::vector<double> skin_voxels;  // distance of the skin from the CT, in voxels of the grid
   double skin_mean_voxels = 0;
@@ -49,7 +49,7 @@ std::vector<QualityCheck> CheckQuality(const PlanBuild& build, const PlanMeasure
 // Whether a plan is ready to be used: all are passed.
 bool AllPassed(const std::vector<QualityCheck>& checks);
 
-// Those that are not, as one text; empty when there is none.
+// The checks that failed, as one text; empty when all passed.
 std::string FailedText(const std::vector<QualityCheck>& checks);
 
 }  // namespace tissueform

@@ -19,8 +19,8 @@ bool DisplayOpens();
 
 // The X display that offscreen rendering needs: the one that DISPLAY names where that can be
 // opened, otherwise an Xvfb of our own on a free display, to which DISPLAY then points. Ended, and
-// DISPLAY put back, by the destructor; it also ends when this process does, whatever ends that.
-// Changes the environment, so make it while no other thread may read that.
+// DISPLAY put back, by the destructor; it also ends when this process does, for any reason. Changes
+// the environment, so make it while no other thread may read that.
 //
 // Errors: NotFound when there is no usable display and Xvfb is not installed, Unavailable when it
 // does not start.

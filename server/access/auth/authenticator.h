@@ -18,23 +18,23 @@ namespace tissueform {
 // What a call brings to say who makes it. Views into the call's headers.
 struct Credentials {
   std::vector<absl::string_view> authorization = {};  // every header of this name, as it was sent
-  // Whom TLS has found at the other end: the subject names of its certificate, alternatives first;
-  // empty without one.
+  // The peer that TLS has identified: the subject names of its certificate, alternatives first;
+  // empty without a certificate.
   std::vector<std::string> certificate_names = {};
 };
 
-// Somebody who is known, and for how long.
+// An identified caller, and how long that identity is valid.
 struct Authenticated {
   std::shared_ptr<const Principal> principal = {};  // never null
   std::chrono::system_clock::time_point expires = std::chrono::system_clock::time_point::max();
-  // What revocations know it by. The SHA-256 of what of the token is signed; empty: there is none.
+  // What revocations know it by: the SHA-256 of the signed part of the token; empty: no token.
   std::string token_id = {};
   std::string token_name = {};  // its `jti`; empty: it has none
   // Before all revocations, where the token does not say.
   std::chrono::system_clock::time_point issued = std::chrono::system_clock::time_point::min();
 };
 
-// Says who makes a call. Thread-safe; called on gRPC's threads, so it waits for nobody.
+// Identifies the caller of each call. Thread-safe; called on gRPC's threads, so it never blocks.
 class Authenticator {
  public:
   virtual ~Authenticator() = default;

@@ -41,7 +41,7 @@ absl::Status CannotRead() {
   return absl::UnavailableError(absl::StrCat("it cannot be read: ", std::strerror(errno)));
 }
 
-// Empty: look into the file whatever it was before.
+// Empty: the file must be read, regardless of its stamp before.
 std::string StampOf(const std::string& path) {
   struct stat status = {};
   if (stat(path.c_str(), &status) != 0) return {};
@@ -103,7 +103,7 @@ void FileWatcher::Run() {
 }
 
 void FileWatcher::Look(File* file) {
-  std::string stamp = StampOf(file->path);  // before it is read: what is written meanwhile is new
+  std::string stamp = StampOf(file->path);  // before the read: later writes change the stamp
   if (!stamp.empty() && stamp == file->stamp) return;
   file->stamp = std::move(stamp);
   const absl::StatusOr<std::string> content = ReadBoundedFile(file->path, file->max_bytes);

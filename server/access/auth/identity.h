@@ -10,8 +10,8 @@ namespace tissueform {
 
 // Who makes a call, and so whose its sessions are.
 struct Principal {
-  // Who it is, by the name that resources, shares and quotas know it by; empty: anonymous, as
-  // everybody is on a server without logins. Goes to the audit log and to no other.
+  // The name by which resources, shares and quotas know the principal; empty: anonymous, as every
+  // caller is on a server without logins. It goes to the audit log and to no other log.
   std::string name = {};
   // What its token says of it, by the names of docs/security.md: "publisher", "bridge", "admin".
   std::set<std::string> roles = {};

@@ -19,7 +19,7 @@ namespace tissueform {
 // That a URL is https, or http of this machine, and brings no password. Errors: InvalidArgument.
 absl::Status CheckJwksUrl(const std::string& url);
 
-// Asks this URL and no other: follows nobody elsewhere, uses no proxy, takes 1 MiB at most, ends
+// Asks this URL and no other: follows no redirects, uses no proxy, takes 1 MiB at most, ends
 // within 10 s, and within a second once `stopping`. Blocks.
 //
 // Errors: Unavailable, without the URL. REQUIRES: CheckJwksUrl.
@@ -28,9 +28,9 @@ absl::StatusOr<std::string> DownloadJwks(const std::string& url, const std::atom
 // When a URL is asked for its keys.
 struct JwksTimes {
   std::chrono::milliseconds refresh = std::chrono::minutes(15);
-  // After it has failed, or has told nonsense.
+  // After a request that failed or returned an unusable answer.
   std::chrono::milliseconds retry = std::chrono::seconds(30);
-  // Between two, however often somebody comes with a key that is not known.
+  // Between two requests, however often callers bring an unknown key.
   std::chrono::milliseconds least = std::chrono::seconds(10);
 };
 

@@ -20,7 +20,7 @@ namespace {
 
 using KeyMap = std::map<std::string, VerificationKey::Pointer>;
 
-// Empty where there is none, or no string.
+// Empty where the member is missing or not a string.
 std::string TextOf(const nlohmann::json& object, const char* name) {
   const auto found = object.find(name);
   return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();

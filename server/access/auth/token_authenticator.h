@@ -27,14 +27,14 @@
 namespace tissueform {
 
 // Knows callers by the JSON Web Tokens of one issuer (docs/security.md): RS256 or ES256, by its
-// keys alone. Authenticate waits for nobody: a token whose key is not known is refused, the URL is
-// asked for its keys meanwhile, and a moment later they are known.
+// keys alone. Authenticate never blocks: it refuses a token with an unknown key and starts a
+// request to the URL for new keys, so that a moment later the key is known.
 class TokenAuthenticator : public Authenticator {
  public:
   using Now = std::function<std::chrono::system_clock::time_point()>;
 
   // Reads keys and revocations, and watches them from then on. Blocks; a URL that does not answer
-  // within 10 s is asked again later, and nobody gets in until then.
+  // within 10 s is asked again later, and until then no token is accepted.
   //
   // Errors: InvalidArgument and Unavailable, in a line that names the option.
   static absl::StatusOr<std::unique_ptr<TokenAuthenticator>> Start(

@@ -20,7 +20,7 @@ class TokenCache {
  public:
   explicit TokenCache(size_t most = 4096) : most_(most) {}
 
-  // Empty: not known. Whoever asks still checks when it ends, and whether it was revoked.
+  // Empty: not known. The caller still checks the expiry and whether the token was revoked.
   std::optional<Authenticated> Find(const std::string& digest);
 
   // Which keys it stands on: taken before a token is verified, it says whether what comes out is

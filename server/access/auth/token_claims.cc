@@ -28,7 +28,7 @@ using SystemTime = std::chrono::system_clock::time_point;
 constexpr size_t kMaxNameBytes = 128;
 // Times beyond are as good as this one; the clock's own type ends in 2262.
 constexpr double kLastSecond = 7'258'118'400;  // of the year 2199
-// Names of principals that are none of a token.
+// Names of principals that a token must not have.
 constexpr absl::string_view kLinkPrefix = "link:";
 
 constexpr std::array<absl::string_view, 3> kTypes = {"jwt", "at+jwt", "application/at+jwt"};
@@ -72,7 +72,7 @@ bool IsForOneOf(const Json* audience, const std::vector<std::string>& wanted) {
   return std::any_of(audience->begin(), audience->end(), is_wanted);
 }
 
-// NumericDate of RFC 7519: seconds since 1970, also with a fraction. Unset: there is none.
+// NumericDate of RFC 7519: seconds since 1970, also with a fraction. Unset: the claim is missing.
 absl::StatusOr<std::optional<SystemTime>> TimeOf(const Json& claims, const char* name) {
   const Json* value = Member(claims, name);
   if (value == nullptr) return std::optional<SystemTime>();
@@ -118,7 +118,7 @@ absl::Status RefuseNotYetValid(SystemTime::duration wait, std::chrono::seconds l
                                   " by the server's clock (tolerance ", leeway.count(), " s)"));
 }
 
-// Of an array of strings; empty where there is none.
+// The names in an array of strings; empty where the claim is missing.
 absl::StatusOr<std::set<std::string>> NamesOf(const Json& claims, const char* name) {
   const Json* value = Member(claims, name);
   std::set<std::string> names;

@@ -47,11 +47,11 @@ absl::Status RefuseToken(TokenFailure failure);
 // verified, and only as QuoteForCaller writes them.
 absl::Status RefuseToken(TokenFailure failure, absl::string_view facts);
 
-// Text for a sentence to somebody who is not known: in double quotes, at most 200 bytes of it, of
-// which "?" replaces all but printable ASCII and quotes.
+// Text for a message to an unauthenticated caller: in double quotes, at most 200 bytes of it; all
+// but printable ASCII and quotes is replaced by "?".
 std::string QuoteForCaller(absl::string_view text);
 
-// How many tokens were refused, by why. Thread-safe; waits for nobody.
+// How many tokens were refused, by reason. Thread-safe; never blocks.
 class TokenFailures {
  public:
   // Nothing where `refusal` was not made by RefuseToken.

@@ -14,7 +14,7 @@
 
 namespace tissueform {
 
-// Whose tokens a server takes. Without any of the options nobody logs in.
+// Whose tokens a server takes. Without any of the options there are no logins.
 struct TokenOptions {
   std::string issuer = {};
   std::vector<std::string> audiences = {};

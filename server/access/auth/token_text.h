@@ -20,9 +20,9 @@ inline constexpr size_t kMaxTokenBytes = 8192;
 // headers, not `Bearer TOKEN`, too long).
 absl::StatusOr<absl::string_view> BearerToken(const std::vector<absl::string_view>& headers);
 
-// A JSON Web Token in its compact form, taken apart and not understood.
+// A JSON Web Token in its compact form, taken apart but not interpreted.
 struct TokenParts {
-  std::string header;             // JSON, unless somebody lies
+  std::string header;             // JSON, unless the token is forged
   std::string claims;             // the same
   std::string signature;          // bytes
   absl::string_view signed_text;  // header and claims as they came: what the signature is of
@@ -37,9 +37,9 @@ std::optional<std::string> DecodeBase64Url(absl::string_view text);
 // 32 bytes.
 std::string Sha256Bytes(absl::string_view bytes);
 
-// What a token is called in a revocation list: SHA-256 of its signed text, in 64 lower-case
-// hexadecimal digits. Not of all of it: an ES256 signature can be written in a second way, by
-// anybody, and the token would have another name.
+// The name of a token in a revocation list: SHA-256 of its signed text, in 64 lower-case
+// hexadecimal digits. Not of the whole token: any holder can write an ES256 signature in a second
+// way, and the token would then have another name.
 std::string TokenDigest(absl::string_view signed_text);
 
 }  // namespace tissueform

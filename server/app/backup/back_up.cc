@@ -22,8 +22,8 @@
 namespace tissueform {
 namespace {
 
-// Copies of the database, until one claims only what is there. The first takes the bulk of the
-// blobs; those after it only what came meanwhile, so that hardly anything can go again.
+// How often the database is copied at most, until all blobs that a copy names are there. The first
+// attempt copies most blobs; the next ones only those added since, so hardly any vanishes again.
 constexpr int kAttempts = 10;
 
 class Copy {

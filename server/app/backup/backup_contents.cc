@@ -61,7 +61,7 @@ absl::StatusOr<FileDigest> ReadAll(const std::string& path,
                                    const std::function<absl::Status(absl::string_view)>& sink) {
   std::error_code error;
   const auto status = std::filesystem::symlink_status(path, error);
-  // Reading a pipe would wait for ever.
+  // Reading a pipe would block forever.
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
     return Damaged(path, "it is not a file");
   }

@@ -65,8 +65,8 @@ struct HttpRequest {
   const std::atomic<bool>* stopping = nullptr;
 };
 
-// Makes one request by http or https (TLS 1.2 and later) and waits for its answer, whatever its
-// status. Follows no redirect.
+// Makes one request by http or https (TLS 1.2 and later) and waits for its answer, of any status.
+// Follows no redirect.
 //
 // Errors, whose messages name neither the URL nor what was sent: DeadlineExceeded (a time limit),
 // Unauthenticated (certificates), OutOfRange (more than max_body_bytes), Cancelled (the sink or

@@ -32,7 +32,7 @@ struct NetworkFileSystem {
 };
 
 // statfs(2), linux/magic.h and the file systems' own sources. FUSE may be a disk of this machine,
-// but sshfs, s3fs and the like cannot be told from it by their number.
+// but sshfs, s3fs and the like have the same number.
 constexpr std::array<NetworkFileSystem, 13> kNetworkFileSystems = {{
     {0x6969, "NFS"},
     {0x517B, "SMB"},
@@ -59,8 +59,8 @@ absl::Status Make(const std::string& path) {
   std::filesystem::create_directories(parent, error);
   if (error) return FileError(error.value(), "data folder: cannot make", parent.string());
   TF_RETURN_IF_ERROR(MakeFolder(path));
-  // Whoever has made it may have died before this. A folder that we may not read is not ours, and
-  // what lies in it was not made by us.
+  // The process that made it may have died before this. A folder that we may not read is not ours,
+  // and we did not create what is in it.
   const absl::Status synced = SyncFolder(parent.string());
   return absl::IsPermissionDenied(synced) ? absl::OkStatus() : synced;
 }

@@ -40,8 +40,8 @@ class DataFolder {
   std::string uploads() const { return path_ + "/uploads"; }
   std::string damaged() const { return path_ + "/damaged"; }
 
-  // Unavailable when the folder that was opened is not there any longer, or another one is: what is
-  // written would be gone with it. Cheap (one system call).
+  // Unavailable when the folder that was opened is missing, or another one is in its place: what is
+  // written would be lost with it. Cheap (one system call).
   absl::Status CheckStillThere() const;
 
  private:

@@ -152,8 +152,8 @@ void Database::Query::CopyColumn(int column, Query* other) const {
 }
 
 absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path) {
-  // Made here, so that nobody else may read it, whatever the umask; SQLite gives its other files
-  // the same rights.
+  // Made here, so that no other user may read it, regardless of the umask; SQLite gives its other
+  // files the same rights.
   TF_RETURN_IF_ERROR(OpenFile::Open(path, O_RDWR | O_CREAT).status());
   return Open(path, SQLITE_OPEN_READWRITE, kSettings);
 }

@@ -48,7 +48,7 @@ class Database {
     int64_t Integer(int column) const;
     absl::string_view Text(int column) const;
     absl::string_view Bytes(int column) const;
-    // Binds it to the next parameter of `other`, whatever its type.
+    // Binds the value of the column, of any type, to the next parameter of `other`.
     void CopyColumn(int column, Query* other) const;
 
    private:
@@ -64,7 +64,7 @@ class Database {
 
   // Opens the database, or makes an empty one; sync its folder then.
   static absl::StatusOr<std::unique_ptr<Database>> Open(const std::string& path);
-  // For reading a file that nobody writes; no other file is made beside it. Errors: NotFound.
+  // For reading a file that no process writes; creates no other file next to it. Errors: NotFound.
   static absl::StatusOr<std::unique_ptr<Database>> OpenForReading(const std::string& path);
   // One that goes with this object. TruncateLog does nothing: there is no log.
   static absl::StatusOr<std::unique_ptr<Database>> OpenInMemory();

@@ -15,7 +15,7 @@
 
 namespace tissueform {
 
-// What a test does at a place; null: nothing. Called on whatever thread passes it.
+// What a test does at a place; null: nothing. Called on the thread that passes it.
 using FaultHook = void (*)(const char* name);
 inline std::atomic<FaultHook> fault_hook = nullptr;
 

@@ -32,8 +32,8 @@ struct ObservedCall {
   bool served = false;           // OnBegin was OK
 };
 
-// Is told of every call: metrics, audit. Thread-safe; called on gRPC's threads and on workers, so
-// it waits for nobody.
+// Receives every call: metrics, audit. Thread-safe; called on gRPC's threads and on workers, so it
+// must not block.
 class CallObserver {
  public:
   virtual ~CallObserver() = default;

@@ -17,9 +17,9 @@
 namespace tissueform {
 
 // Counts every principal's calls against its quotas: how many a second, how many at once, and how
-// many of those are streams. Forgets who has no call open and all tokens back.
+// many of those are streams. Forgets principals that have no call open and all tokens back.
 //
-// Thread-safe; waits for nobody.
+// Thread-safe; never blocks.
 class CallQuotas {
  public:
   explicit CallQuotas(const Quotas& quotas, const Clock* clock = Clock::System());
@@ -30,7 +30,7 @@ class CallQuotas {
   void End(const std::string& principal, CallKind kind);
 
   int open_streams(const std::string& principal) const;
-  // Of whom something is remembered.
+  // How many principals are remembered.
   int64_t num_principals() const;
 
  private:

@@ -22,21 +22,21 @@
 
 namespace tissueform {
 
-// What every call is asked, and who is told of it. All pointers may be null, and must outlive the
+// The checks and observers of every call. All pointers may be null, and must outlive the
 // calls.
 struct CallChecks {
-  Authenticator* authenticator = nullptr;  // null: everybody is anonymous
-  // Whether somebody who is known may call a method ("MeshService.GetMesh") at all; empty: yes.
+  Authenticator* authenticator = nullptr;  // null: all callers are anonymous
+  // Whether an identified caller may call a method ("MeshService.GetMesh") at all; empty: yes.
   std::function<absl::Status(const Principal& caller, std::string_view method)> may_call = {};
   CallObserver* observer = nullptr;
-  CallQuotas* quotas = nullptr;   // not of who is anonymous
+  CallQuotas* quotas = nullptr;   // not for anonymous callers
   std::string gateway_name = {};  // see ClientAddress
-  // What this server is called in its cluster (kNodeHeader); empty: there is none.
+  // The server's name in its cluster (kNodeHeader); empty without a cluster.
   std::string node_name = {};
 };
 
-// What stands before every call: who makes it, who is told of it, how many a principal may make,
-// whether the server takes new work; and how many calls are open. Thread-safe.
+// What every call passes first: the checks of its caller and its quotas, and whether the server
+// takes new work. Also counts the open calls. Thread-safe.
 class AdmissionControl {
  public:
   explicit AdmissionControl(CallChecks checks) : checks_(std::move(checks)) {}
@@ -77,20 +77,20 @@ std::string RequestIdOr(std::string_view from_client);
 inline constexpr std::chrono::milliseconds kReauthorizePeriod{500};
 
 // The common beginning and end of every rpc: made first, asked for its admission, ended once with
-// the outcome. The place where a caller is authenticated and observers are told.
+// the outcome. It authenticates the caller and notifies the observers.
 //
 // Logs method, code, duration and request id, and nothing else that came from the client: names and
 // messages may identify a patient. One thread at a time.
 //
 // In a cluster it says the server's name in initial and trailing metadata of every reply, and
-// refuses a call that is meant for another server, before anything else is asked of it.
+// refuses a call that is meant for another server, before any other check.
 class CallScope {
  public:
   // `method` ("MeshService.GetMesh") and `gate` must outlive the scope. `context` is read and given
   // metadata here and not kept; null where there is no network: a call without headers.
   CallScope(grpc::CallbackServerContext* context, std::string_view method, CallKind kind,
             AdmissionControl* gate);
-  // Of a scope that was not ended: the call is over all the same, and the log says so.
+  // A scope that was not ended: the call is over nevertheless, and the log says so.
   ~CallScope();
   CallScope(CallScope&& other) noexcept;
   CallScope& operator=(CallScope&&) = delete;
@@ -102,14 +102,14 @@ class CallScope {
   const Authenticated& authenticated() const { return authenticated_; }
   const std::string& request_id() const { return request_id_; }
 
-  // The call stands on this token from now on. Errors: those of the authenticator;
-  // Unauthenticated (it is another's). Nothing to do where nobody logs in.
+  // The call relies on this token from now on. Errors: those of the authenticator;
+  // Unauthenticated (the token belongs to another user). Does nothing without logins.
   absl::Status Renew(const std::string& token);
-  // On that of another call, where it is the same caller's and ends later.
+  // The same with the token of another call, if that has the same caller and expires later.
   void RenewFrom(const Authenticated& other);
 
-  // For calls that last: whether this one may go on. Asked again every kReauthorizePeriod; not
-  // where nobody logs in.
+  // For calls that last: whether this one may go on. Asked again every kReauthorizePeriod,
+  // except without logins.
   bool may_end_early() const {
     return gate_ != nullptr && gate_->checks().authenticator != nullptr;
   }

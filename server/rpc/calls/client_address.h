@@ -13,8 +13,8 @@
 namespace tissueform {
 
 // From where a call comes, without a port; empty where there is no network (`context` null, a Unix
-// socket). What the header states counts only of a peer whose certificate has the name
-// `gateway_name` (empty: of nobody).
+// socket). The header counts only if the certificate of the peer has the name
+// `gateway_name` (empty: it never counts).
 std::string ClientAddress(const grpc::CallbackServerContext* context,
                           const Credentials& credentials, absl::string_view gateway_name);
 

@@ -34,7 +34,7 @@ inline CancelCall CancelOf(grpc::CallbackServerContext* context) {
 template <typename Response>
 class MessageStream : public grpc::ServerWriteReactor<Response> {
  public:
-  // Makes the next message; false when there is none. An error ends the call.
+  // Makes the next message; false when there are no more. An error ends the call.
   using Next = std::function<absl::StatusOr<bool>(Response* message)>;
   // Runs a job elsewhere.
   using Post = std::function<void(std::function<void()> job)>;
@@ -44,7 +44,7 @@ class MessageStream : public grpc::ServerWriteReactor<Response> {
                 std::chrono::milliseconds patience)
       : scope_(std::move(scope)), cancel_(std::move(cancel)), timer_(timer), patience_(patience) {}
 
-  // Of whoever works.
+  // Used by the thread that works on the call.
   CallScope& scope() { return scope_; }
 
   // One of the two, once, from any thread. `next` is called from threads of gRPC, so not long; or

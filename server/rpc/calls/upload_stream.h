@@ -64,7 +64,7 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   void OnDone() override {
     std::pair<DeadlineTimer::Id, DeadlineTimer::Id> deadlines;
     {
-      MutexLock lock(mutex_);  // whoever called Finish may still hold it
+      MutexLock lock(mutex_);  // the thread that called Finish may still hold it
       deadlines = {deadline_, answer_deadline_};
     }
     timer_->Cancel(deadlines.first);
@@ -93,7 +93,7 @@ class UploadStream : public grpc::ServerReadReactor<Request> {
   virtual absl::StatusOr<After> Take(const Request& request) = 0;
   // Of all that has come. On a worker.
   virtual absl::Status Check() = 0;
-  // Lets go of what has come, so that the client may begin anew when it hears of the end. On a
+  // Releases what has come, so that the client may start again when it hears of the end. On a
   // worker.
   virtual void Close() = 0;
   // How the call ends whose client sends no more, or says nothing. No job is under way then.

@@ -106,7 +106,7 @@ void SessionWatches::OnSessionEvent(const std::string& session_id, SessionEvent 
       channel->EndWatches(SessionDeleted(session_id));
       return;
     case SessionEvent::kMoved:
-      // Whoever watches here again begins with the committed pose, not with a frame of before.
+      // A new watch here begins with the committed pose, not with an earlier frame.
       channels_.erase(found);
       channel->EndWatches(SessionMoved(""));
       return;

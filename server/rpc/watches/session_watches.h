@@ -21,14 +21,14 @@
 
 namespace tissueform {
 
-// What a stream is told of a server that ends then.
+// The notice for streams of a server that drains and ends at `end`.
 v1::DeformNotice DrainingAt(std::chrono::system_clock::time_point end);
 
-// A watcher who is acknowledged frames.
+// A watcher whose client acknowledges frames.
 class CreditedWatcher : public Watcher {
  public:
-  // `by` whom it is acknowledged: its token may be newer than the watch's. Errors: InvalidArgument
-  // (a frame that was not sent).
+  // `by`: the caller that acknowledges; its token may be newer than the watch's. Errors:
+  // InvalidArgument (a frame that was not sent).
   virtual absl::Status Acknowledge(uint64_t number, const Authenticated& by) = 0;
 
  protected:
@@ -44,14 +44,14 @@ class SessionWatches {
   // `pool` must outlive the watches and all their channels.
   SessionWatches(const ServiceLimits& limits, WorkerPool* pool) : limits_(limits), pool_(pool) {}
 
-  // Lives as long as somebody drags or watches.
+  // Lives as long as there is a drag or a watch.
   std::shared_ptr<WatchChannel> ChannelOf(const std::string& session_id);
 
   struct Joined {
     std::shared_ptr<WatchChannel> channel;
     bool has_frame = false;  // WatchChannel::Add
   };
-  // `watcher` follows the session for `principal` under the id `watch`, which nobody else has.
+  // `watcher` follows the session for `principal` under the id `watch`, which no other watch has.
   // Errors: ResourceExhausted.
   absl::StatusOr<Joined> Add(const std::string& watch, const std::string& session_id,
                              CreditedWatcher* watcher, const std::string& principal = "");

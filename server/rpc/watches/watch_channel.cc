@@ -117,7 +117,7 @@ void WatchChannel::Remove(Watcher* watcher) {
   watchers_.erase(watcher);
   TellDrags();
   if (!watchers_.empty()) return;
-  // Kept as it came until somebody watches again.
+  // Kept without encoding until there is a watcher again.
   shown_.reset();
   MutexLock newest_lock(newest_mutex_);
   watched_ = false;

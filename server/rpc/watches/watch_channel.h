@@ -22,14 +22,14 @@ namespace tissueform {
 using SharedBytes = std::shared_ptr<const grpc::ByteBuffer>;
 SharedBytes ToBytes(const v1::WatchResponse& message);
 
-// A frame on its way to those who watch; encoded once for all of them.
+// A frame on its way to the watchers; encoded once for all of them.
 struct WatchedFrame {
   uint64_t number = 0;
   std::shared_ptr<const v1::WatchForm> form;
   SharedBytes bytes;  // a WatchResponse
 };
 
-// Somebody who watches. Called with the channel's lock held: must not call the channel, nor block.
+// A client that watches. Called with the channel's lock held: must not call the channel, nor block.
 class Watcher {
  public:
   virtual void Show(const std::shared_ptr<const WatchedFrame>& frame) = 0;
@@ -40,8 +40,8 @@ class Watcher {
   ~Watcher() = default;
 };
 
-// Somebody who drags. Called with the channel's lock held, by which AddDrag and RemoveDrag are
-// taken, too: must not call the channel, nor take a lock that is held while it is called, nor
+// A client that drags. Called with the channel's lock held, which AddDrag and RemoveDrag take, too:
+// must not call the channel, nor take a lock that is held while the channel is called, nor
 // block.
 class Dragger {
  public:
@@ -51,10 +51,10 @@ class Dragger {
   ~Dragger() = default;
 };
 
-// From the drags of one session to those who watch it: the newest frame, encoded once on a worker
-// when somebody watches. Frames that come faster than they are encoded replace each other.
+// From the drags of one session to its watchers: the newest frame, encoded once on a worker if
+// there are watchers. Frames that come faster than they are encoded replace each other.
 //
-// Thread-safe. Those who drag lay a pointer down and never wait for those who watch.
+// Thread-safe. Drags hand over a pointer and never wait for watchers.
 class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
  public:
   // Made by std::make_shared. `pool` must outlive the channel.
@@ -67,11 +67,11 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
   void PublishBase(v1::WatchOrigin origin, v1::DeformFrame frame,
                    std::shared_ptr<const v1::WatchForm> form) ABSL_LOCKS_EXCLUDED(newest_mutex_);
 
-  // It is told when somebody watches already, and whenever the number changes.
+  // The dragger is notified if there are watchers already, and whenever the number changes.
   void AddDrag(Dragger* dragger);
   void RemoveDrag(Dragger* dragger);
 
-  // The watcher is shown the newest frame; false when there is none: somebody must PublishBase.
+  // The watcher is shown the newest frame; false if there is no frame: the caller must PublishBase.
   bool Add(Watcher* watcher);
   // REQUIRES: added.
   void Remove(Watcher* watcher);
@@ -79,7 +79,7 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
 
   void Tell(const v1::DeformNotice& notice);
   void EndWatches(const absl::Status& outcome);
-  // Ends the watches as soon as nobody drags.
+  // Ends the watches as soon as there are no drags.
   void EndWithDrags(const absl::Status& outcome);
 
  private:
@@ -98,7 +98,7 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
   std::optional<Newest> TakeToEncode() ABSL_LOCKS_EXCLUDED(newest_mutex_);
 
   WorkerPool* const pool_;
-  uint64_t last_number_ = 0;  // of whoever encodes
+  uint64_t last_number_ = 0;  // of the thread that encodes
 
   mutable Mutex watchers_mutex_;  // before the other, and before the locks of the watchers
   std::set<Watcher*> watchers_ ABSL_GUARDED_BY(watchers_mutex_);

@@ -19,17 +19,17 @@
 
 namespace tissueform {
 
-// Tells changes in their order, on a thread and a connection of its own. Where nothing is told for
-// some seconds it asks whether the other end is there, and connects again when that is not answered
+// Reports changes in their order, on a thread and a connection of its own. After some seconds
+// without a change it checks whether the other end is there, and connects again without an answer
 // (PostgresOptions::unanswered_timeout).
 class ChangeListener {
  public:
   using Callback = std::function<void(const StoreChange&)>;
 
-  // What is committed after it has returned is told. Errors: those of PostgresConnection.
+  // What is committed after it has returned is reported. Errors: those of PostgresConnection.
   static absl::StatusOr<std::unique_ptr<ChangeListener>> Start(const PostgresOptions& options,
                                                                Callback told);
-  // `told` is not called any longer.
+  // Afterwards `told` is no longer called.
   ~ChangeListener();
   ChangeListener(const ChangeListener&) = delete;
   ChangeListener& operator=(const ChangeListener&) = delete;
@@ -40,7 +40,7 @@ class ChangeListener {
   // Errors: those of PostgresConnection; then there is no connection.
   absl::Status Connect() ABSL_LOCKS_EXCLUDED(mutex_);
   void Loop();
-  // What was told; empty after a while without. Errors: the connection is of no use any longer.
+  // The notices that came; empty after a while without. Errors: the connection is no longer usable.
   absl::StatusOr<std::vector<std::string>> Wait();
   // False at the end.
   bool ConnectAgain();

@@ -25,16 +25,16 @@ class HeldLeases {
                                  std::chrono::steady_clock::time_point now);
   std::vector<std::string> Sessions();
 
-  // After an Acquire. Returns what is lost by it: the lease under another epoch, since what was
-  // made under that has been somebody else's in between.
+  // After an Acquire. Returns what is lost by it: the lease under another epoch, since another
+  // server may have held the session in between.
   std::vector<SessionLease> Acquired(const std::string& session, const LeaseAnswer& answer);
   // Takes one out.
   std::optional<SessionLease> Take(const std::string& session);
   // Holds what was renewed, or is held as before; returns what is held no longer. Strays were
-  // acquired by a call whose answer was lost: nobody knows of them.
+  // acquired by a call whose answer was lost, so this server does not know of them.
   std::vector<SessionLease> Renewed(const std::vector<SessionLease>& renewed,
                                     std::vector<SessionLease>* strays);
-  // Takes out those that may not be answered any longer.
+  // Takes out those that may no longer be answered.
   std::vector<SessionLease> TakeEnded(std::chrono::steady_clock::time_point now);
 
  private:

@@ -118,7 +118,7 @@ void LeaseKeeper::Loop() {
       }
       if (ending_) return;
     }
-    // Why not, the next call of somebody says; what runs out is told in any case.
+    // The next call for a session reports why it failed; what runs out is reported in any case.
     pause = Renew().value_or(std::min(options_.renew_every, options_.silence));
   }
 }

@@ -27,12 +27,12 @@ class LeaseKeeper {
  public:
   struct Options {
     std::chrono::milliseconds renew_every{3'000};
-    // After a call that the store did not answer nobody waits for another one for so long, but for
-    // renewals: it is answered as that was. After so long renewing is tried again. A row that
+    // After a call that the store did not answer, other calls than renewals fail at once with the
+    // same error for this time, instead of waiting. After it renewing is tried again. A row that
     // others have locked is an answer.
     std::chrono::milliseconds silence{1'000};
-    // After a renewal that has passed over a row that somebody wrote: its lease should not be
-    // shorter than the others' by a whole round.
+    // After a renewal that has passed over a row that another call was writing: its lease should
+    // not be shorter than the others' by a whole round.
     std::chrono::milliseconds again{200};
     SteadyNow clock = AwakeOrNotNow;
   };
@@ -40,7 +40,7 @@ class LeaseKeeper {
   // for each lease that is lost, without a lock held.
   using LostCallback = std::function<void(const SessionLease&)>;
 
-  // `leases` must outlive it, and be used by nobody else.
+  // `leases` must outlive it, and be used by nothing else.
   LeaseKeeper(SessionLeases* leases, Options options, LostCallback lost);
   // Ends renewing. Leases are not released: see ReleaseAll.
   ~LeaseKeeper() { Stop(); }
@@ -49,24 +49,24 @@ class LeaseKeeper {
 
   // A thread renews from now on. Once.
   void Start();
-  // And no longer: nobody is told of what is lost by it.
+  // Ends renewing: `lost` is not called for the leases that are lost by it.
   void Stop();
 
   // As SessionLeases::Acquire; where it is mine it is kept.
   absl::StatusOr<LeaseAnswer> Acquire(const std::string& session);
   absl::Status Release(const std::string& session);
-  // The session is gone. Fast; nobody is told of its lease.
+  // The session is gone. Fast; `lost` is not called for its lease.
   void Forget(const std::string& session) { held_.Take(session); }
   // So that others go on at once: at the end of a drain. Errors: the first; tries all.
   absl::Status ReleaseAll();
 
-  // The epoch to write under; none when the session may not be answered (any longer). Fast.
+  // The epoch to write under; empty when the session may not be answered. Fast.
   std::optional<int64_t> EpochOf(const std::string& session);
 
   int CountHeld() { return static_cast<int>(held_.Sessions().size()); }
 
   // What the thread does, and after how long it does so again. Errors: why nothing was renewed;
-  // what ran out meanwhile is lost all the same.
+  // leases that have run out by then are lost nevertheless.
   absl::StatusOr<std::chrono::milliseconds> Renew();
 
  private:

@@ -28,7 +28,7 @@ struct MigrationSummary {
 // copy.
 //
 // Errors: FailedPrecondition (there is something in `to`), DataLoss (a blob of `from` is damaged),
-// or those of the stores. After an error `to` holds a part: empty its database, and begin anew.
+// or those of the stores. After an error `to` holds a part: empty its database, and start again.
 absl::StatusOr<MigrationSummary> MigrateStore(SqlStores* from, PostgresStores* to);
 
 }  // namespace tissueform

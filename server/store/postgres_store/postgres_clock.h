@@ -12,7 +12,7 @@
 
 namespace tissueform {
 
-// The database's time, on which servers agree whatever their machines' clocks say: as it was asked
+// The database's time, on which servers agree regardless of their machines' clocks: as it was asked
 // last, and as it went on since by a clock that never goes back.
 //
 // Thread-safe.

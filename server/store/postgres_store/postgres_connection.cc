@@ -23,7 +23,7 @@ namespace {
 
 using Ticks = std::chrono::steady_clock::rep;
 
-// While it lives somebody waits for the database.
+// While it lives a call waits for the database.
 class WaitForAnswer {
  public:
   explicit WaitForAnswer(std::atomic<Ticks>* since) : since_(since) {
@@ -89,7 +89,7 @@ class NoticeReceiver final : public pqxx::notification_receiver {
   std::vector<std::string>* const notices_;
 };
 
-// libpqxx prints what nobody handles.
+// libpqxx prints errors that have no handler.
 class QuietHandler final : public pqxx::errorhandler {
  public:
   explicit QuietHandler(pqxx::connection_base& connection) : errorhandler(connection) {}
@@ -121,7 +121,7 @@ struct PostgresConnection::Library {
   QuietHandler quiet;
   // A descriptor of ours of its socket, so that its number is never another file's.
   int socket = -1;
-  std::atomic<Ticks> waits_since = 0;  // 0: nobody does
+  std::atomic<Ticks> waits_since = 0;  // 0: no call waits
   std::vector<std::string> notices;
   std::unique_ptr<NoticeReceiver> receiver;  // before the connection's end
 };

@@ -62,12 +62,12 @@ class PostgresConnection {
   // was lost.
   void GiveUp(std::chrono::milliseconds unanswered);
 
-  // False when it is of no use any longer.
+  // False when it is no longer usable.
   bool usable() const { return usable_; }
 
-  // From now on WaitForNotices returns what is told in this channel. Once.
+  // From now on WaitForNotices returns the notices of this channel. Once.
   absl::Status Listen(const std::string& channel);
-  // What has been told, in order; empty after `most` without.
+  // The notices that have come, in order; empty after `most` without.
   absl::StatusOr<std::vector<std::string>> WaitForNotices(std::chrono::milliseconds most);
 
  private:

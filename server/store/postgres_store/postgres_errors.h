@@ -9,7 +9,7 @@
 #include "absl/strings/string_view.h"
 
 // What libpqxx throws, as a Status: one line, which names the database and no value, and is for the
-// log; clients are told a sentence of our own.
+// log; clients receive a sentence of our own.
 namespace tissueform {
 
 // What a statement or a connection has failed with.

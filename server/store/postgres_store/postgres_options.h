@@ -24,9 +24,9 @@ struct PostgresOptions {
   std::chrono::milliseconds statement_timeout{20'000};
   // The database ends a statement that waits longer for what another one has locked.
   std::chrono::milliseconds lock_timeout{10'000};
-  // The database ends a transaction between whose statements so much time passes, and what it has
-  // locked is free. Shorter than a lease: whoever stands still between a write and its commit, or
-  // is cut off there, keeps nobody from taking its sessions.
+  // The database ends a transaction between whose statements so much time passes, and releases
+  // what it has locked. Shorter than a lease: a server that stops or is cut off between a write
+  // and its commit does not keep others from taking its sessions.
   std::chrono::milliseconds idle_timeout{3'000};
   // Without any answer to a statement for so long the connection is given up: the database ends
   // what takes too long, so it, or what lies between, is gone. Longer than the other two.
@@ -45,8 +45,8 @@ struct PostgresTarget {
 };
 
 // Reads the URL. A host elsewhere is asked for its certificate (sslmode=verify-full) unless the URL
-// says an sslmode; "allow" and "prefer", with which nobody knows what he gets, are refused. Of
-// several hosts the one that takes writes is chosen, unless it says target_session_attrs.
+// says an sslmode; "allow" and "prefer", which do not guarantee encryption, are refused. Of several
+// hosts the one that takes writes is chosen, unless it says target_session_attrs.
 //
 // Errors: InvalidArgument (no such URL; a password in it; such an sslmode; a number below 1).
 absl::StatusOr<PostgresTarget> TargetOf(const PostgresOptions& options);
@@ -54,7 +54,7 @@ absl::StatusOr<PostgresTarget> TargetOf(const PostgresOptions& options);
 // The password: what stands in the file without the line's end; where no file is named what stands
 // in the environment variable TISSUEFORM_STORE_PASSWORD, or nothing.
 //
-// Errors: FailedPrecondition (anybody may read the file), or what the disk says.
+// Errors: FailedPrecondition (other users may read the file), or what the disk says.
 absl::StatusOr<std::string> ReadPostgresPassword(const std::string& file);
 
 }  // namespace tissueform

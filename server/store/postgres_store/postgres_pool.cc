@@ -82,7 +82,7 @@ PostgresPool::Clock::duration PostgresPool::Patience() {
   const Clock::duration left = options_.patience - options_.waited();
   MutexLock lock(mutex_);
   if (failed_ <= answered_) return options_.patience;
-  // Nobody may have asked since: then one try.
+  // No call may have asked since: then one try.
   return Clock::now() - failed_ < kLeastAnswer ? left : std::max<Clock::duration>(left, kMaxLate);
 }
 
@@ -115,7 +115,7 @@ absl::Status PostgresPool::TryUntil(const Work& work, Clock::time_point deadline
     return HidingDatabase(absl::UnavailableError(
         absl::StrCat("database ", target_.name, ": it did not answer in time; try again later")));
   }
-  absl::Status lost;  // of a commit that may have been kept: that is true whatever came after it
+  absl::Status lost;  // of a commit that may have been kept; later failures do not change that
   for (std::chrono::milliseconds pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
     const Clock::time_point tried = Clock::now();
     PostgresOutcome outcome = PostgresOutcome::kFailed;
@@ -196,7 +196,7 @@ void PostgresPool::GiveBack(std::unique_ptr<PostgresConnection> connection,
   if (connection != nullptr && connection->usable()) {
     idle_.push_back(std::move(connection));
   } else if (connection != nullptr) {
-    // What one was lost by the others were lost by, too: whoever took one would wait once more.
+    // The others are lost for the same reason: a call that took one would wait once more.
     suspects.swap(idle_);
   }
   changed_.NotifyAll();

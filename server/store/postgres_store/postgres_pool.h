@@ -32,9 +32,9 @@ class PostgresPool {
   // Whether a second commit of the same work changes nothing.
   enum class Idempotent { kYes, kNo };
 
-  // Connects once, so that what an operator must change is told at the start: errors are those of
-  // TargetOf and PostgresConnection; FailedPrecondition when the database is a read-only replica,
-  // holds text that is no UTF-8, or answers before it has written (synchronous_commit).
+  // Connects once, so that what an operator must change is reported at the start: errors are those
+  // of TargetOf and PostgresConnection; FailedPrecondition when the database is a read-only
+  // replica, holds text that is not UTF-8, or answers before it has written (synchronous_commit).
   static absl::StatusOr<std::unique_ptr<PostgresPool>> Open(const PostgresOptions& options);
   // Calls that wait are answered UNAVAILABLE.
   ~PostgresPool();
@@ -46,7 +46,7 @@ class PostgresPool {
   // statement at most kLeastAnswer.
   //
   // Errors: what `work` says, those of PostgresConnection, and Unavailable (all connections are in
-  // use until then; the database is not there until then, for whatever reason). Those of the
+  // use until then; the database is not there until then, for any reason). Those of the
   // database are logged, and have a sentence for clients (store_errors.h).
   absl::Status Run(const Work& work, Idempotent idempotent = Idempotent::kNo) {
     return Run(work, Clock::now() + Patience(), idempotent);
@@ -57,7 +57,7 @@ class PostgresPool {
   static constexpr std::chrono::milliseconds kMaxLate{1'000};
   static constexpr std::chrono::milliseconds kLeastAnswer{5'000};
 
-  // No call waits for the database any longer than until then: the server ends.
+  // No call waits for the database beyond this time: the server ends.
   void EndWaiting(Clock::time_point by);
 
   const PostgresOptions& options() const { return options_; }

@@ -17,12 +17,12 @@ namespace tissueform {
 // Leases as columns beside a session's epoch, on the clock tissueform_now() of the database. Each
 // call is one statement, which the database decides alone.
 //
-// A lease that ends later than leases do is from before that clock was set back. Whoever lives
-// renews it, and who does not would keep its sessions for as long as the clock was set back: so it
+// A lease that ends later than leases do is from before that clock was set back. A live holder
+// renews it, but a dead one would keep its sessions for as long as the clock was set back: so it
 // is over when this has seen it unchanged for a lease's time.
 class PostgresSessionLeases final : public SessionLeases {
  public:
-  // `node`: where clients find this server. Two servers of one name are two holders all the same:
+  // `node`: where clients find this server. Two servers of one name are still two holders:
   // each makes a random one. `pool` must outlive it.
   PostgresSessionLeases(PostgresPool* pool, std::string node, LeaseOptions options = {},
                         SteadyNow clock = AwakeOrNotNow);

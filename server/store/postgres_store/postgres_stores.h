@@ -20,7 +20,7 @@ struct PostgresStoresOptions {
   PostgresOptions database = {};
   UnixClock clock = nullptr;  // null: the database's
   // Of meshes that have not arrived in full: they are this server's own, in a temporary folder that
-  // goes with it. A client whose server is gone sends such a mesh anew.
+  // goes with it. A client whose server is gone sends such a mesh again.
   UploadLimits uploads = {};
 };
 

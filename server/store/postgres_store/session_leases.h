@@ -44,29 +44,29 @@ struct LeaseAnswer {
   std::string node = {};    // who holds it otherwise: where clients find the session
 };
 
-// Who of several servers holds a session: one at a time, by a lease on the store's clock. An epoch
-// belongs to one holder: whoever takes a session over gets one that is greater than every one given
-// before, of whatever session, and the store refuses writes under any lower one. Were they counted
-// for each session, one that is deleted and made again would begin with epochs that an earlier
-// holder still has. A lease that has run out is lost even when nobody has taken the session
-// over; whoever wants it acquires it again.
+// Which of several servers holds a session: one at a time, by a lease on the store's clock. An
+// epoch belongs to one holder: a server that takes a session over gets one that is greater than
+// all given before, for any session, and the store refuses writes under any lower one. If epochs
+// were counted for each session, one that is deleted and made again would begin with epochs that
+// an earlier holder still has. A lease that has run out is lost even when no server has taken the
+// session over; a server that wants it acquires it again.
 //
 // An object of this kind is one holder. Calls block; thread-safe. Errors: what the store says,
-// Unavailable above all; then nothing is known, and Acquire and Renew may be called again: who
-// holds a session already keeps its epoch.
+// Unavailable above all; then nothing is known, and Acquire and Renew may be called again: a server
+// that holds a session already keeps its epoch.
 class SessionLeases {
  public:
   virtual ~SessionLeases() = default;
 
-  // Takes a session that nobody holds, or whose lease has run out, under a new epoch; of one
-  // that this holds already the lease begins anew. Errors: NotFound.
+  // Takes a session that no server holds, or whose lease has run out, under a new epoch; renews the
+  // lease of one that this holds already. Errors: NotFound.
   virtual absl::StatusOr<LeaseAnswer> Acquire(const std::string& session) = 0;
 
-  // The leases of all sessions that this still holds begin anew; returns those. Others are lost.
-  // One that somebody writes at this moment nobody waits for: it is held as before.
+  // Renews the leases of all sessions that this still holds; returns those. Others are lost.
+  // It does not wait for a session that is being written at this moment: that is held as before.
   virtual absl::StatusOr<std::vector<SessionLease>> Renew() = 0;
 
-  // Others may take it at once. Nothing happens when it is not held under this epoch any longer.
+  // Others may take it at once. Nothing happens when it is no longer held under this epoch.
   virtual absl::Status Release(const std::string& session, int64_t epoch) = 0;
 };
 

@@ -7,8 +7,8 @@
 
 namespace tissueform {
 
-// What other servers must know of a change that one of them, or anybody else, has made in the
-// database.
+// What other servers must know of a change in the database, by one of them or by any other
+// client.
 struct StoreChange {
   enum class Kind {
     kSessionCreated,

@@ -32,7 +32,7 @@ constexpr char kBuild[] = "planBuilds/1";
 const grpc::Status kGone(grpc::StatusCode::UNAVAILABLE, "the server is away");
 const grpc::Status kDamaged(grpc::StatusCode::DATA_LOSS, "other bytes");
 
-// Keeps what it is sent, and breaks off where it is told to.
+// Keeps what it receives, and breaks off where a test wants it to.
 class FaultyBuilds final : public v1::PlanBuildService::Service {
  public:
   grpc::Status GetBuildFile(grpc::ServerContext*, const v1::GetBuildFileRequest* request,

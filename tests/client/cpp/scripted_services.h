@@ -181,7 +181,7 @@ class ScriptedStreams final : public v1::DeformService::Service {
     return poses_;
   }
 
-  std::atomic<bool> commits = true;  // what is to be committed is, and the client is told
+  std::atomic<bool> commits = true;  // commits are kept, and the client receives a notice
 
  private:
   std::vector<v1::WatchOrigin> TakeOrigins() {

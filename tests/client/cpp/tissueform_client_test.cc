@@ -22,7 +22,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::tissueform::testing::StatusIs;
 
-// A port of this machine that is taken, but where nobody listens.
+// A port of this machine that is taken, but on which no process listens.
 class SilentPort {
  public:
   SilentPort() : socket_(socket(AF_INET, SOCK_STREAM, 0)) {

@@ -37,7 +37,7 @@ TEST(MethodTable, OthersAndUnknownOnesDoNot) {
   }
 }
 
-// The linker leaves out what nobody names: a service that is added must be named in the table.
+// The linker leaves out unreferenced services: a service that is added must be named in the table.
 TEST(MethodTable, KnowsEveryMethodOfTheProtocol) {
   int found = 0;
   for (const auto& entry :

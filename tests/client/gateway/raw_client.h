@@ -13,7 +13,7 @@
 
 namespace tissueform::testing {
 
-// A connection to loopback that sends what it is told to, right or wrong. Gives up after a minute.
+// A connection to loopback that sends any bytes, valid or not. Gives up after a minute.
 class RawClient {
  public:
   explicit RawClient(int port);

@@ -131,7 +131,7 @@ TEST(SocketFrames, TheLongestDeadlineIsAYear) {
   EXPECT_EQ(ParseStart(start.SerializeAsString())->timeout, std::chrono::hours(366 * 24));
 }
 
-// Whatever comes before the positions.
+// Regardless of what comes before the positions.
 TEST(SocketFrames, PositionsLieAtMultiplesOfFour) {
   for (uint64_t sequence = 1; sequence < (uint64_t{1} << 60); sequence *= 3) {
     v1::DeformResponse response;

@@ -16,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using testing::StatusIs;
 
-// Nobody listens there; nothing is sent either.
+// No server listens there; nothing is sent either.
 constexpr char kNobody[] = "unix:/nonexistent/tissueform.sock";
 
 TEST(UpstreamPool, CallsBeyondAllChannelsAreRefusedByName) {

@@ -60,8 +60,8 @@ class AwayDatabase final : public SqlDatabase {
   int asked_ = 0;
 };
 
-// Ann has a session, a prediction of it and a case, all in one project but the prediction; nobody
-// else has anything.
+// Ann has a session, a prediction of it and a case, all in one project but the prediction; no
+// other user has anything.
 class AccessTest : public ::testing::Test {
  protected:
   void SetUp() override {

@@ -22,7 +22,7 @@ namespace {
 using ::testing::MatchesRegex;
 using Code = absl::StatusCode;
 
-// Takes whatever comes.
+// Accepts any credentials.
 class Everybody final : public Authenticator {
  public:
   absl::StatusOr<Authenticated> Authenticate(const Credentials& /*credentials*/) override {

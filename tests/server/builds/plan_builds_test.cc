@@ -210,7 +210,7 @@ TEST_F(PlanBuildsTest, TheFilesOfABuildGoWithIt) {
 TEST_F(PlanBuildsTest, AFileThatIsAnnouncedAgainStaysForTheNextBuild) {
   const auto request = Request("first");
   ASSERT_OK_AND_ASSIGN(const v1::PlanBuild first, builds_->Create("ann", request));
-  // While it is built its owner is told that the file is there, and will build from it once more.
+  // While it is built its owner learns that the file is there, and will build from it once more.
   ASSERT_THAT(files_->Ask("ann", request.ct().substr(11)), IsOk());
   builder_.LetGo(1);
   WaitFor(IdOf(first), v1::PLAN_BUILD_STATE_SUCCEEDED);

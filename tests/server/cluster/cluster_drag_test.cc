@@ -114,8 +114,8 @@ TEST_F(ClusterDragTest, ADrainedNodeGivesItsSessionsToTheOthersAtOnce) {
   std::thread draining([&] { a_.server->Drain(); });
   const absl::Status end = drag.Finish();
   EXPECT_THAT(end, MovedTo(""));
-  // A lease that had to run out would take longer than one that was given back, but nothing of that
-  // is measured here: nobody is told that it is a's.
+  // A lease that had to run out would take longer than one that was given back, but that is not
+  // measured here: only that b takes the session, and a holds no lease in the end.
   absl::Status taken;
   EXPECT_TRUE(Eventually([&] {
     taken = AskOnce(b_, session, 1).status();

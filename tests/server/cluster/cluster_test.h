@@ -46,7 +46,7 @@ class RawDrag {
   std::optional<v1::DeformFrame> ReceiveFrame(uint64_t sequence);
   // Until the poses of this sequence are kept. False when the stream has ended.
   bool WaitForCommit(uint64_t sequence);
-  // What the next commit that is told of failed with; empty where it did not.
+  // What the next commit that is reported failed with; empty where it did not.
   std::string NextCommitsFailure();
   // How it has ended; reads what is left.
   absl::Status Finish();
@@ -59,7 +59,7 @@ class RawDrag {
   bool finished_ = false;
 };
 
-// Two servers "a" and "b" on one empty database, on which everybody is who he says (NamedCallers).
+// Two servers "a" and "b" on one empty database; callers are who they say they are (NamedCallers).
 class ClusterTest : public ::testing::Test {
  protected:
   void SetUp() override;

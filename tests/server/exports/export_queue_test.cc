@@ -26,7 +26,7 @@ using Code = absl::StatusCode;
 
 const std::string kCase(64, 'c');
 
-// A store of which every call fails when it is told to.
+// A store whose calls fail while it is `broken`.
 class BrokenStore final : public ExportStore {
  public:
   explicit BrokenStore(ExportStore* store) : store_(*store) {}
@@ -159,7 +159,7 @@ TEST_F(ExportQueueTest, WhatNobodyHereKnowsIsAskedForOnce) {
   EXPECT_EQ(same.id, "other") << "one that is not done is given again, whoever has made it";
 }
 
-// A watch looks up an export that was taken back while it is told of another. Where the look-up
+// A watch looks up an export that was withdrawn while it is notified of another. If the look-up
 // asked the store it would wait for itself.
 TEST_F(ExportQueueTest, WhoIsToldOfOneFindsThatAnotherIsGoneWithoutTheStore) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord gone, Ask("p"));

@@ -39,7 +39,7 @@ class SystemdNoticesTest : public ::testing::Test {
   }
   void TearDown() override { close(socket_); }
 
-  // What is told next; with MSG_DONTWAIT nothing when there is nothing yet.
+  // The next notice; with MSG_DONTWAIT nothing if there is no notice yet.
   std::string Told(int flags = 0) const {
     std::array<char, 200> bytes{};
     const ssize_t size = recv(socket_, bytes.data(), bytes.size(), flags);

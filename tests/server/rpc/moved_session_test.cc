@@ -179,7 +179,7 @@ TEST_F(MovedSessionTest, AStreamDoesNotWaitForACommitThatTheStoreNeverAnswers) {
   TellLost();
   EXPECT_TRUE(HasMoved(stream->WaitUntilDone()));
   stream.reset();
-  answer(absl::OkStatus());  // finds nobody
+  answer(absl::OkStatus());  // finds no stream
 }
 
 TEST_F(MovedSessionTest, AStreamWhoseSessionHadLeftMemoryIsToldWhoHasIt) {

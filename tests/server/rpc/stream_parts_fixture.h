@@ -19,7 +19,7 @@ namespace tissueform::testing {
 // Sessions for the parts of a stream, without registry and without gRPC.
 class StreamPartsTest : public ::testing::Test {
  protected:
-  // This thread stands for the making strand, so nothing else may be made at the same time.
+  // This thread stands for making_strand(), so nothing else may be made at the same time.
   std::shared_ptr<Session> MakeSession(SessionRecord record) {
     record.id = "id";
     std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);

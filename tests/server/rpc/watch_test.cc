@@ -54,7 +54,7 @@ class WatchTest : public ReactorsTest {
       if (!response.has_value() || !response->notice().has_followers()) return response;
     }
   }
-  // The next number of followers that the drag is told.
+  // The next number of followers that the drag receives.
   static int Followers(FakeStream* stream) {
     const std::optional<v1::DeformResponse> response = stream->Receive();
     EXPECT_TRUE(response.has_value() && response->notice().has_followers());
@@ -137,7 +137,7 @@ TEST_F(WatchTest, ADragThatNobodyFollowsHearsNothingOfIt) {
   EXPECT_TRUE(drag->WaitUntilDone()->ok());
 }
 
-// Whatever is under way when it ends.
+// Regardless of what is under way when it ends.
 TEST_F(WatchTest, DragsAndFollowersComeAndGoAtOnce) {
   const std::string session = MakeSession();
   std::vector<std::thread> threads;

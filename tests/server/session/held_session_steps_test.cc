@@ -29,7 +29,7 @@ using testing::SharedSessions;
 enum class Action {
   kOpen,
   kRenew,
-  kTell,       // what has run out is told to be lost, without asking the store
+  kTell,       // what has run out is reported as lost, without asking the store
   kCommit,     // of the newest drag
   kCommitOld,  // of the oldest one, as a server does that was stopped
   kUpdate,
@@ -73,7 +73,7 @@ std::string ToString(const std::vector<Step>& steps) {
 class HeldSessionStepsTest : public ::testing::Test {
  protected:
   HeldSessionStepsTest() {
-    // Whatever is made below shares what these have prepared.
+    // All that is made below shares what these have prepared.
     for (const size_t node : {0, 1}) EXPECT_THAT(node_(node).Create(absl::StrCat(node)), IsOk());
   }
 

@@ -201,7 +201,7 @@ TEST_F(HeldSessionsTest, WhoWaitsForASessionThatIsLostMeanwhileDoesNotWaitForThe
   EXPECT_EQ(a_.registry.table().size(), 0) << "what nobody waits for is not kept";
 }
 
-// As when the database comes back: whoever asked may have made it elsewhere, and deleted it again.
+// As when the database comes back: the client may have made it elsewhere, and deleted it again.
 TEST_F(HeldSessionsTest, WhatIsMadeForNobodyIsTakenBackThoughItsLeaseIsNotToBeHad) {
   a_.ownership.set_silent(true);
   a_.ownership.set_acquired([this] { a_.Cancel(); });

@@ -267,7 +267,7 @@ TEST_F(HousekeepingTest, AClockThatIsSetBackDeletesNothingEarly) {
   Pass(60);
   EXPECT_EQ(housekeeping_->RunOnce().sessions, 0);
   EvictAll();
-  // Put right: now all that was written meanwhile looks as if nobody had used it for a year.
+  // Put right: now all that was written before looks as if it had not been used for a year.
   unix_s_ += 400 * kDay;
   Pass(60);
   Housekeeping::Removed removed = housekeeping_->RunOnce();

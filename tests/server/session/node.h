@@ -50,7 +50,7 @@ class Node {
     return Wait<Opened>(
         [&](const auto& done) { registry.loader().Create(record, bar_, flag_, done); });
   }
-  // Whoever waits for an answer does so no longer.
+  // Callers that wait for an answer stop waiting.
   void Cancel() { registry.loader().CancelWait(flag_); }
   Opened Open(const std::string& id) {
     return Wait<Opened>([&](const auto& done) { registry.loader().Open(id, flag_, done); });
@@ -97,7 +97,7 @@ class Node {
     pool_->Post(lane, [gone = go.get_future().share()] { gone.wait(); });
     return go;
   }
-  // How often this session was told to have moved.
+  // How often this session was reported to have moved.
   int CountMoved(const std::string& id) {
     MutexLock lock(mutex_);
     return static_cast<int>(std::count(moved_.begin(), moved_.end(), id));

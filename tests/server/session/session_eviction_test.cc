@@ -70,7 +70,7 @@ class SessionEvictionTest : public ::testing::Test {
     return promise->get_future();
   }
 
-  // Of somebody with a name.
+  // With this owner.
   Opened CreateOf(const std::string& owner, const std::string& request_id = "") {
     SessionRecord record = BarRecord(*bar_);
     record.owner = owner;
@@ -251,7 +251,7 @@ TEST_F(SessionEvictionTest, ACancelledOpenerIsAnsweredAtOnceAndTheOthersGetTheSe
   *cancelled = true;
   registry_->loader().CancelWait(cancelled);
   EXPECT_THAT(impatient.get(), StatusIs(absl::StatusCode::kCancelled));
-  std::future<Opened> patient = Open("a");  // joins what nobody waits for any longer
+  std::future<Opened> patient = Open("a");  // joins what no caller waits for
   release.set_value();
   EXPECT_THAT(patient.get(), IsOk());
 }

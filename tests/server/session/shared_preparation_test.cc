@@ -53,7 +53,7 @@ int64_t ResidentBytes(const std::string& field) {
   return -1;
 }
 
-// From here on the most is counted anew. False where the kernel does not allow it.
+// From here on the maximum is counted again. False where the kernel does not allow it.
 bool RestartHighWaterMark() {
   malloc_trim(0);
   std::ofstream file("/proc/self/clear_refs");

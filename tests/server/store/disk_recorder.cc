@@ -53,8 +53,8 @@ bool IsBelow(const std::string& path, const std::string& folder) {
   return !folder.empty() && path.compare(0, folder.size(), folder) == 0;
 }
 
-// The path from the recorded folder on; nothing for one that lies elsewhere. The index of the log
-// is made anew from the log: what is in it does not count.
+// The path from the recorded folder on; nothing for one elsewhere. The index of the log
+// is made again from the log: what is in it does not count.
 std::optional<std::string> Inside(const Recorder& recorder, const char* path) {
   const std::string text = path;
   if (recorder.recorded.empty() || text.find("-shm") != std::string::npos) return std::nullopt;

@@ -39,7 +39,7 @@ struct DiskOp {
   std::string bytes = {};     // of kWrite
 };
 
-// Begins anew with an empty folder. One at a time.
+// Starts again with an empty folder. One at a time.
 void StartRecording(const std::string& folder);
 void MarkRecording(int64_t number);
 std::vector<DiskOp> StopRecording();
@@ -56,7 +56,7 @@ void MakeDiskReadOnly(const std::string& folder, bool read_only);
 // disk be: bytes are there when their file was synced, names when their folder was.
 class DiskImage {
  public:
-  // What of the writes that were not synced has reached the disk all the same. A disk may choose.
+  // Which of the writes that were not synced have reached the disk nevertheless. A disk may choose.
   enum class Kept { kNothing, kLastOfEachFile };
 
   void Apply(const DiskOp& op);

@@ -22,7 +22,7 @@
 #include "tests/testing/status_matchers.h"
 
 // A disk that loses power. One run of the workload is recorded, down to its writes and syncs; then
-// the disk is made anew as it was at a moment, without what had not been synced, and the store is
+// the disk is made again as it was at a moment, without what had not been synced, and the store is
 // opened from it. A sync is taken out by leaving it out of the replay.
 namespace tissueform {
 namespace {

@@ -14,14 +14,14 @@
 
 namespace tissueform {
 
-// What a store has been told, as plain maps: what a test compares it with.
+// What a store has been asked to keep, as plain maps: what a test compares it with.
 struct StoreModel {
   std::map<std::string, std::string> sessions;  // id -> SerializeRecord
   std::set<int> meshes;                         // numbers of SamplePayload
   std::map<std::string, int> predictions;       // id -> number of SamplePositions
   std::set<int> cases;                          // numbers of SampleCase
   std::map<int, int64_t> uploads;               // number of SamplePayload -> bytes committed
-  std::set<std::string> erased;                 // texts that nobody may find any longer
+  std::set<std::string> erased;                 // texts that may no longer be found
   std::set<std::string> erased_blobs;           // names of their files
 };
 

@@ -68,7 +68,7 @@ export function cautionsBox(report: BuildReport, onOpen: () => void): HTMLDetail
   return box;
 }
 
-/** `pictureOf`: the address of a picture, or null while there is none. */
+/** `pictureOf`: the address of a picture; rejects if it cannot be fetched. */
 export function reportBox(report: BuildReport, cautions: HTMLElement, pictureOf: (file: string) => Promise<string>): HTMLElement {
   const failed = report.quality.filter(({ passed }) => !passed);
   const rows = [...failed, ...report.quality.filter(({ passed }) => passed)].map(({ requirement, required, measured, passed }) =>

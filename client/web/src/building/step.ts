@@ -14,7 +14,7 @@ export interface Step {
   update(): void;
 }
 
-/** A number with its label: shows `set`, tells what a user typed. A text that is not a number is marked and told nobody. */
+/** A number with its label: shows `set`, and reports what a user typed. A text that is not a number is marked and not reported. */
 export function numberField(label: string, unit: Unit, onNumber: (value: number) => void, decimals = 1): { element: HTMLElement; set(value: number): void } {
   const id = newId("number");
   const input = el("input", { id, attributes: { type: "text", inputmode: "decimal", autocomplete: "off" } });

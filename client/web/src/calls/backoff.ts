@@ -21,8 +21,8 @@ const LASTING_MS = 2000;
 
 /**
  * How long to wait before each further try: twice as long each time, up to 5 s, a fifth at random so that pages spread. Not at
- * all where an error says which server to ask instead, up to four times on end, and once where it says that there is another.
- * After a success that lasted it begins anew.
+ * all where an error says which server to ask instead, up to four times in a row, and once where it says that there is another.
+ * After a success that lasted it starts again.
  */
 export class Backoff {
   private tries = 0;

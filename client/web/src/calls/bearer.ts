@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-/** The token that goes with every call. In memory only; "": none, as where nobody logs in. */
+/** The token that goes with every call. In memory only; "": without a token, as where the server has no logins. */
 export class Bearer {
   private current = "";
   private readonly listeners = new Set<(token: string) => void>();

@@ -28,7 +28,7 @@ export class CallError extends Error {
     this.name = "CallError";
   }
 
-  /** Whether the same call may succeed in a moment: nobody answered, or not for now. */
+  /** Whether the same call may succeed in a moment: no server answered, or it refused only for now. */
   get isPassing(): boolean {
     // A server that is killed shows as UNAVAILABLE directly, as UNKNOWN or INTERNAL behind proxies.
     return this.isOfServer || this.node !== "" || this.code === Code.DeadlineExceeded || this.reason === "UPLOAD_UNDER_WAY";
@@ -76,7 +76,7 @@ export function unlessCancelled(thrown: unknown): unknown {
   return error;
 }
 
-/** Whatever was thrown, as a CallError. */
+/** Converts any thrown value to a CallError. */
 export function toCallError(thrown: unknown): CallError {
   if (thrown instanceof CallError) return thrown;
   const error = ConnectError.from(thrown);

@@ -22,9 +22,9 @@ export interface Socket {
 /** Makes the socket of one call. */
 export type SocketFactory = () => Socket;
 
-/** What a call tells its owner. Nothing is told after `onEnd`, and nothing after `cancel`. */
+/** What a call reports to its owner. It reports nothing after `onEnd`, and nothing after `cancel`. */
 export interface CallHandlers<Response> {
-  /** What the server says of itself before its first message, by names in lower case; not told where it says nothing. */
+  /** What the server says of itself before its first message, by names in lower case; not called where it says nothing. */
   onBegin?(headers: Record<string, string>): void;
   /** A message of the server, with the frame that it lies in. */
   onMessage(message: Response, frame: Frame): void;
@@ -121,7 +121,7 @@ export class CallSocket<M extends DescMethod> {
     this.write(FrameKind.HalfClose, new Uint8Array());
   }
 
-  /** Ends the call at once; its handlers are told nothing more. */
+  /** Ends the call at once and calls no more handlers. */
   cancel(): void {
     if (this.over) return;
     this.over = true;

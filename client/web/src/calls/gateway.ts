@@ -117,7 +117,7 @@ export class Gateway {
   }
 
   /**
-   * A call of one request with answers in between: `onMessage` is told of each; resolves at the call's end, rejects with a
+   * A call of one request with answers in between: `onMessage` receives each; resolves at the call's end, rejects with a
    * CallError. An aborted `signal` cancels it.
    */
   stream<M extends DescMethod>(

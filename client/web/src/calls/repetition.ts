@@ -27,8 +27,8 @@ const BROWSER_CLOCK: RepetitionClock = {
 
 /**
  * Sends calls over gRPC-Web to the server that holds their session, learns from what comes back where that is, and makes unary
- * calls again: at once where the answer says who holds it, after a while where a server is gone. What was refused before
- * anything was done is repeated whatever it is, all else only where nothing is done twice.
+ * calls again: at once where the answer says which server holds it, after a while where a server is gone. Any call that was refused
+ * before anything was done is repeated; all others only where nothing is done twice.
  * A quick call that has no answer is made again over another connection: browsers keep connections, and one may be dead though
  * neither side has closed it.
  */

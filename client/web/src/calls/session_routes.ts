@@ -19,8 +19,8 @@ const MOST_TURNS = 40;
 const LONGEST_TURN_MS = 5000;
 
 /**
- * Which server of a cluster holds which session, as far as answers and errors have told. Calls name that server; where it has
- * gone, they name none and are sent on by whoever stands before the servers. Empty where there is one server.
+ * Which server of a cluster holds which session, as far as answers and errors have shown. Calls name that server; where it has
+ * gone, they name none, and the proxy before the servers chooses one. Empty where there is one server.
  */
 export class SessionRoutes {
   // Sessions that were heard of last stand last.
@@ -58,8 +58,8 @@ export class SessionRoutes {
   }
 
   /**
-   * A call that was sent to `node` ("": to none) has failed. What was learned since then stays. What its owner is to be told:
-   * the error, or that it leads in a circle.
+   * A call that was sent to `node` ("": to none) has failed. What was learned since then stays. Returns what its owner gets to
+   * see: the error, or that it leads in a circle.
    */
   failed(session: string, node: string, error: CallError): CallError {
     if (error.node !== "") this.learn(session, error.node);
@@ -71,7 +71,7 @@ export class SessionRoutes {
     const last = this.strays.get(session);
     const isNext = last !== undefined && last.node === node && this.now() - last.atMs < LONGEST_TURN_MS;
     const turns = isNext ? last.turns + 1 : 1;
-    // Whoever tries again after that begins anew.
+    // A later try starts counting again.
     if (turns > MOST_TURNS) this.strays.delete(session);
     else this.strays.set(session, { node, turns, atMs: this.now() });
     return turns;

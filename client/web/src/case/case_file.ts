@@ -13,7 +13,7 @@ import { type Manifest, type SurfaceEntry, readManifest } from "./manifest";
 /** Where the bytes of a case come from: a file of this computer, or a server. */
 export interface CaseSource {
   readonly totalBytes: number;
-  /** Exactly `length` bytes from `offset`. `onBytes` is told how many of them have come. */
+  /** Exactly `length` bytes from `offset`. `onBytes` receives how many of them have come. */
   read(offset: number, length: number, onBytes?: (count: number) => void): Promise<Uint8Array<ArrayBuffer>>;
 }
 

@@ -46,7 +46,7 @@ export interface Evaluation {
   positions: Float32Array;
   /** "beyond": these poses are not what was prepared; ask the server. */
   coverage: "covered" | "beyond";
-  /** Of every position, mm; infinite for poses that are none. */
+  /** Of every position, mm; infinite for invalid poses. */
   errorBoundMm: number;
   /** Of neo_hookean the error is an estimate and no bound. */
   isEstimate: boolean;
@@ -115,7 +115,7 @@ export class AnswerEvaluator {
     return result;
   }
 
-  /** In an array of the caller's; null where there are none: no such columns, poses that are none, for a band where one turns too far, for places that are not covered. */
+  /** In an array of the caller's; null: no such columns, invalid poses, too large a turn (band), poses that are not covered (positions). */
   valuesAt(poses: readonly Pose[], kind: ValueKind): Float32Array | null {
     if (!this.setPoses(poses)) return null;
     if (kind === "positions") return this.places();
@@ -150,7 +150,7 @@ export class AnswerEvaluator {
     return Float32Array.from(new Float64Array(this.exports.memory.buffer, this.exports.contact_forces(), rows), (force) => FORCE_UNIT_N * force);
   }
 
-  /** The memory may grow at any call, which takes its old arrays away from whoever still has them: what is given out is a copy. */
+  /** The memory may grow at any call, which detaches its old arrays: so callers get a copy. */
   private copy(address: number, out: Float32Array): void {
     out.set(new Float32Array(this.exports.memory.buffer, address, out.length));
   }

@@ -14,7 +14,7 @@ export type FromWorker =
   | { kind: "values"; values: Float32Array | null }
   | { kind: "evaluated"; positions: Float32Array; coverage: "covered" | "beyond"; errorBoundMm: number; isEstimate: boolean; uncertainty: Float32Array | null };
 
-/** The worker's side, for whoever has a `post`. */
+/** The worker's side, for any context that has a `post`. */
 export class EvaluationService {
   private evaluator: AnswerEvaluator | null = null;
 

@@ -26,7 +26,7 @@ export interface MovingPlan {
   photograph: BoundPhotograph | null;
 }
 
-/** The same as tissueform export takes of a plan: nothing that names anybody. */
+/** The same as tissueform export takes of a plan: nothing that identifies a person. */
 export function movingDataOf(file: CaseFile, { poses, model, answers, photograph }: MovingPlan): MovingData {
   const { manifest } = file;
   // Answers know handles by their order in the session.
@@ -50,7 +50,7 @@ function poseEntry(pose: Pose | undefined, handle: HandleEntry): HandleEntry["po
   return { rotationVectorDeg: degrees, pivotMm: pose.pivotMm, translationMm: pose.translationMm, scale: pose.scale };
 }
 
-/** Whether the file will show its own plan, and not for ever the last picture before it. */
+/** Whether the file will show its own plan, and not only the last picture before it. */
 async function showsPlan(data: MovingData): Promise<boolean> {
   const poses = posesOfCase({ manifest: data });
   const evaluator = await AnswerEvaluator.open(data.answers, await evaluatorModule());

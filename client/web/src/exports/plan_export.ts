@@ -4,6 +4,7 @@
 import * as three from "three";
 import { headAxes, toMove } from "../geometry/pose";
 import type { MeasureResult } from "../measures/evaluation";
+import type { MovementBand } from "../measures/movement_bands";
 import { intervalOf } from "../measures/texts";
 import { type ShownFace, landmarkMovements } from "../measures/face_measures";
 import type { DrawnSurface } from "../scene/head";
@@ -49,15 +50,20 @@ function contactLine({ file }: Pick<Workbench, "file">): string[] {
   return file.sessionRequest.contact.length > 0 ? ["contact: lips part, tissue slides"] : [];
 }
 
-/** What is told of a plan. */
+/** What measureAtRest and movementBandsAtRest give. */
+export interface NumbersAtRest {
+  measures: readonly MeasureResult[];
+  movements: readonly (MovementBand | null)[] | null;
+}
+
+/** What the export contains of a plan. */
 export type ToldPlan = ShownFace & Pick<Workbench, "answer" | "caseName" | "model" | "modelInfo" | "plan"> & { stored: Pick<StoredPredictions, "all"> };
 
 /**
  * A plan that `tissueform plan check` and `deform` take (docs/plan-format.md), with what the planner shows of it. Movements and
- * measures are of the plan's face, and left out while another one is shown. `results`: its measures. `ranges`: what plannedRanges
- * gives.
+ * measures are of the plan's face, and left out while another one is shown. `ranges`: what plannedRanges gives.
  */
-export function planDocument(bench: ToldPlan, results: readonly MeasureResult[], ranges: PlannedRanges = null): string {
+export function planDocument(bench: ToldPlan, atRest: NumbersAtRest, ranges: PlannedRanges = null): string {
   const { manifest, materialRanges } = bench.file;
   const poses = bench.plan.poses();
   const byHandle = new Map(bench.plan.handles.map(({ name }, index) => [name, poses[index]]));
@@ -80,7 +86,7 @@ export function planDocument(bench: ToldPlan, results: readonly MeasureResult[],
       move_about_plan_pivot: toMove(poses[index], handle.pivotMm, manifest.headFrame),
     })),
     measurement_landmarks: bench.landmarks.save(),
-    ...(bench.showsPlan ? { landmarks: movements(bench), measures: measures(results), answer: answerFacts(bench.answer.value) } : {}),
+    ...(bench.showsPlan ? { landmarks: movements(bench, atRest.movements), measures: measures(atRest.measures), answer: answerFacts(bench.answer.value) } : {}),
     ...(leftOut.length === 0 ? {} : { left_out: leftOut.join("; ") }),
     predictions: bench.stored.all.value.map(({ name, title }) => ({ name, title })),
   };
@@ -88,13 +94,17 @@ export function planDocument(bench: ToldPlan, results: readonly MeasureResult[],
   return JSON.stringify(document, null, 2).replace(/\[\n[\s\d.,eE+-]+\]/g, (numbers) => numbers.replace(/\s+/g, ""));
 }
 
-function movements(bench: ToldPlan): object[] {
+function movements(bench: ToldPlan, bands: NumbersAtRest["movements"]): object[] {
   const { landmarks } = bench.file.manifest;
-  return landmarkMovements(bench).map(({ bandMm, ...movement }, index) => ({
-    name: landmarks[index].name,
-    ...movement,
-    ...(bandMm === null ? {} : { band_95_mm: bandMm }),
-  }));
+  return landmarkMovements(bench).map(({ bandMm, ...movement }, index) => {
+    const total = bands?.[index]?.totalMm;
+    return {
+      name: landmarks[index].name,
+      ...movement,
+      ...(bandMm === null ? {} : { band_95_mm: bandMm }),
+      ...(total === undefined ? {} : { lowest_total_mm: total.lowest, highest_total_mm: total.highest, interval_of: intervalOf(total) }),
+    };
+  });
 }
 
 function measures(results: readonly MeasureResult[]): object[] {

@@ -105,7 +105,7 @@ export class BoneSolid {
 
 const AT_REST: Pose = { rotationVector: [0, 0, 0], pivotMm: [0, 0, 0], translationMm: [0, 0, 0], scale: 1 };
 
-/** Segments of `bones` (those with a handle) in others, under these poses; a pair is told once for each segment. */
+/** Segments of `bones` (those with a handle) in others, under these poses; reports a pair once for each segment. */
 export class PenetrationTest {
   private readonly samples: { bone: BoneSolid; points: Vector[]; restDepths: Map<BoneSolid, Float32Array> }[];
 

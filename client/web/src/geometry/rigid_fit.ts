@@ -8,7 +8,7 @@ import type { Pose } from "./pose";
 
 const SMALLEST_SPREAD_MM = 1;
 
-/** Three of `vertices` that lie far from each other and from a line, or null where there are none; `positions`: #V by 3. */
+/** Three of `vertices` that are far from each other and from a line, or null without such vertices; `positions`: #V by 3. */
 export function spreadTriple(positions: Float32Array, vertices: readonly number[]): [number, number, number] | null {
   if (vertices.length < 3) return null;
   const first = vertices[0];

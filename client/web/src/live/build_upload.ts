@@ -11,7 +11,7 @@ import { type Progress, sendChunks } from "./upload";
 
 /**
  * Sends a file that a plan is built from, from where an earlier upload of the same bytes broke off; done at once where the server
- * has it. Resolves with its name, "buildFiles/{sha256}". Goes on by itself where the server goes away meanwhile. Rejects with a
+ * has it. Resolves with its name, "buildFiles/{sha256}". Resumes by itself if the server goes away during the upload. Rejects with a
  * CallError, or with the reason of `signal`, which also removes what has arrived.
  */
 export async function uploadBuildFile(gateway: Gateway, file: Blob, suffix: string, onProgress: Progress, signal: AbortSignal): Promise<string> {

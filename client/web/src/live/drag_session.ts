@@ -41,7 +41,7 @@ export interface DragListener {
   onWaiting(isWaiting: boolean): void;
   /** The connection broke off; the drag goes on in `delayMs`. */
   onBroken(error: CallError, delayMs: number): void;
-  /** The drag is over, for a reason that trying again does not mend. */
+  /** The drag is over, for a reason that another try does not fix. */
   onEnd(error: CallError): void;
 }
 
@@ -99,12 +99,12 @@ export class DragSession {
     if (this.isStarted) this.sendNewest(commit);
   }
 
-  /** Whether the newest poses were told to be kept. */
+  /** Whether the newest poses are known to be kept. */
   get isCommitted(): boolean {
     return this.uncommitted === null;
   }
 
-  /** Nothing is told afterwards. */
+  /** The listener is not called afterwards. */
   close(): void {
     this.isClosed = true;
     this.unwatch();

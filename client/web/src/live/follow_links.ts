@@ -18,7 +18,7 @@ export function isLinkToken(text: string): boolean {
   return text.startsWith(TOKEN_PREFIX);
 }
 
-/** A link that is asked for again is made anew when so little of its life is left. */
+/** A requested link is replaced by a new one when so little of its life is left. */
 const LEAST_LEFT_MS = 3_600_000;
 
 /** Links by which others follow this page's session and see its case. All reject with a CallError. */

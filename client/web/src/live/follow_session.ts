@@ -44,7 +44,7 @@ const ACKNOWLEDGE_AGAIN_MS = 1000;
 const DRAG_RETURNS_MS = 5000;
 
 /**
- * Follows a session that somebody else drags; opens the watch again where the connection breaks off. A server that has just
+ * Follows a session that another user drags; opens the watch again where the connection breaks off. A server that has just
  * taken the session begins with what was committed: the face stays as it was until the drag is back.
  */
 export class FollowSession {
@@ -73,7 +73,7 @@ export class FollowSession {
     this.connect();
   }
 
-  /** Nothing is told afterwards. */
+  /** The listener is not called afterwards. */
   close(): void {
     this.isClosed = true;
     this.unwatch();
@@ -143,7 +143,7 @@ export class FollowSession {
     });
   }
 
-  // A watch stands on the token of its newest acknowledgement: said once more where nobody drags.
+  // A watch depends on the token of its newest acknowledgment. Without frames no other is sent, so it is repeated.
   private renew(token: string): void {
     if (token !== "" && this.used !== null) this.acknowledge(this.watch, this.used);
   }

@@ -30,12 +30,12 @@ export interface LiveListener {
   onNotice(text: string): void;
 }
 
-/** How often one attempt may be mended (made anew, opened instead, without prepared answers) before it is said to fail. */
+/** How often one attempt may be repaired (created again, opened instead, without prepared answers) before it is reported as failed. */
 const MOST_MENDED = 4;
 
 /**
- * The session of this tab for one case: opened again where it was left, made anew where the server has lost it, with one drag on
- * it whose model may change. Errors are told as the connection's state; nothing is thrown.
+ * The session of this tab for one case: opened again where it was left, created again where the server has lost it, with one drag on
+ * it whose model may change. The connection's state reports errors; nothing is thrown.
  */
 export class LiveSession {
   session = "";
@@ -109,7 +109,7 @@ export class LiveSession {
     const isOver = () => attempt !== this.attempt;
     const backoff = new Backoff();
     let isThere = exists;
-    // Taken and yet missing: it belongs to whoever was signed in here before.
+    // Taken and yet missing: it belongs to the user who was signed in here before.
     let wasMissing = false;
     for (let mended = 0; ; ) {
       try {

@@ -94,7 +94,7 @@ export class LocalAnswers {
     if (this.configuration !== null) void this.follow(this.configuration);
   }
 
-  /** New poses of the hand. In the page the answer is told before this returns. */
+  /** New poses of the hand. If the page evaluates them itself, it reports the answer before this returns. */
   ask(poses: readonly Pose[]): void {
     this.poses = poses;
     this.asked += 1;

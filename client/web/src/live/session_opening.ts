@@ -93,7 +93,7 @@ async function prepare(gateway: Gateway, session: string, request: PrepareSessio
   return result;
 }
 
-/** Deletes a session that nobody needs any longer; that it is gone already is no error. */
+/** Deletes a session that is no longer needed; it is not an error if it is gone already. */
 export async function deleteSession(gateway: Gateway, session: string): Promise<void> {
   try {
     await gateway.sessions.deleteSession({ name: session }, { headers: sessionMetadata(session) });

@@ -21,8 +21,8 @@ const BUFFER_POLL_MS = 10;
 export type Progress = (share: number) => void;
 
 /**
- * Sends a case, whose bytes have the SHA-256 `sha256`; done at once where the server has it. Sent once more where the server goes
- * away meanwhile. Rejects with a CallError.
+ * Sends a case, whose bytes have the SHA-256 `sha256`; done at once where the server has it. Sent once more if the server goes
+ * away during the upload. Rejects with a CallError.
  */
 export function uploadCase(gateway: Gateway, source: CaseSource, sha256: string, title: string, onProgress: Progress): Promise<Case> {
   return repeated(() => sendCase(gateway, source, sha256, title, onProgress), (error) => error.isOfServer);

@@ -1,11 +1,11 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-/** Where this page's users log in: what the gateway was told (docs/gateway.md). */
+/** Where this page's users log in: the gateway's configuration (docs/gateway.md). */
 export interface LoginConfig {
   issuer: string;
   clientId: string;
-  /** For whom tokens are asked for; "": the provider's choice. */
+  /** The requested audience of tokens; "": the provider's choice. */
   audience: string;
   scope: string;
 }
@@ -20,7 +20,7 @@ export async function fetchLoginConfig(base: string): Promise<LoginConfig | null
   } catch {
     throw new Error("the gateway does not answer: try again in a moment");
   }
-  // Whatever serves the page in the gateway's place knows of no login.
+  // A server that serves the page in the gateway's place does not know about logins.
   if (response.status === 404) return null;
   if (!response.ok) throw new Error(`the gateway does not report how to log in (${response.status}): try again in a moment`);
   return readLoginConfig(await response.json().catch(() => undefined));

@@ -175,7 +175,7 @@ function otherIssuer(found: unknown, expected: string): string {
   return `The identity provider's issuer is ${bounded(found)}, and this page expects ${bounded(expected)}. ${advice}`;
 }
 
-/** Of what somebody else has sent: at most 200 letters, and no others than printable ASCII. */
+/** A text from another party: at most 200 letters, and only printable ASCII. */
 function bounded(text: unknown): string {
   return String(text).slice(0, 200).replace(/[^\x20-\x7e]/g, "?");
 }

@@ -9,7 +9,7 @@ export interface Redirect {
   verifier: string;
   /** What stood behind the page's #. */
   hash: string;
-  /** Nobody was to be asked anything. */
+  /** The provider must not ask the user anything. */
   isSilent: boolean;
   /** What the user had under their hands; the page's own, null where nothing was. */
   work: unknown;

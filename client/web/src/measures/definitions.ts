@@ -30,7 +30,7 @@ const LEGAN = "Legan and Burstone 1980";
 const RICKETTS = "Ricketts 1968";
 /** Shorter arms of an angle tell nothing. */
 const LEAST_ARM_MM = 1;
-/** A nose tip that is less in front of chin and lip than this is none. */
+/** A nose tip that is less in front of chin and lip than this does not count. */
 const LEAST_NOSE_MM = 3;
 
 const fine = () => null;

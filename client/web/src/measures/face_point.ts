@@ -24,7 +24,7 @@ export function hasHeadFrame(file: CaseFile): boolean {
   return file.manifest.headFrame.source !== "scanner";
 }
 
-/** In which the face is measured: the head frame, or where there is none the scanner's axes about the middle of the skin. */
+/** The frame of the face's measures: the head frame, or without one the scanner's axes about the middle of the skin. */
 export function faceFrame(file: CaseFile): HeadFrame {
   const { headFrame } = file.manifest;
   const skin = file.surfaces.find(({ entry }) => entry.kind === "skin");

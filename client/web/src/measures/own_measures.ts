@@ -29,7 +29,7 @@ export function ownDefinition({ landmarks }: OwnMeasure, index: number, label: (
   };
 }
 
-/** What was saved; what is none is left out. */
+/** The saved measures; invalid entries are left out. */
 export function readOwnMeasures(value: unknown): OwnMeasure[] {
   if (!Array.isArray(value)) return [];
   const isName = (name: unknown) => typeof name === "string" && /^[a-z_0-9]{1,40}$/.test(name);

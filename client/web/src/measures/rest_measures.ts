@@ -3,6 +3,7 @@
 
 import type { MeasureResult } from "./evaluation";
 import { type ShownFace, measureFace } from "./face_measures";
+import type { MovementBand } from "./movement_bands";
 import type { PlanAnswers } from "./whole_band";
 
 /**
@@ -16,4 +17,11 @@ export async function measureAtRest(face: ShownFace, answers: PlanAnswers): Prom
   const bands = await wholeBands(face, answers).catch(() => null);
   if (bands === null) return results;
   return results.map((result) => (result.kind === "value" ? { ...result, band: bands.get(result.definition.name) ?? result.band } : result));
+}
+
+/** Of each of the case's landmarks, likewise; null where `measureAtRest` knows the material's interval alone. */
+export async function movementBandsAtRest(face: ShownFace, answers: PlanAnswers): Promise<(MovementBand | null)[] | null> {
+  if (!face.showsPlan) return null;
+  const { movementBands } = await import("./movement_bands");
+  return movementBands(face, answers).catch(() => null);
 }

@@ -9,7 +9,7 @@ const ROOT_MM = 25;
 const FOREHEAD_MM = 75;
 /** The forehead stands out of the root of the nose by so much at least; less is a hump of the nose's back, or no forehead. */
 const LEAST_BROW_MM = 1;
-/** A mentolabial fold that is less deep is none: the angle at it would tell the noise of the skin. */
+/** A shallower mentolabial fold does not count: the angle at it would only measure the noise of the skin. */
 const LEAST_FOLD_MM = 1;
 /** The chin's lower border lies within so many mm below its foremost point. */
 const CHIN_MM = 30;
@@ -27,7 +27,7 @@ export function suggestFromProfile(profile: readonly ProfilePoint[], known: Face
   if (nose !== undefined) add("soft_glabella", glabella(between(profile, nose.up + FOREHEAD_MM, nose.up), nose.up + ROOT_MM));
   if (nose !== undefined && subnasale !== undefined) add("columella", columella(between(profile, nose.up, subnasale.up), nose, subnasale));
   if (upper !== undefined && lower !== undefined) {
-    // Not the lower one: where the skin is closed between the lips both would lie on each other, and their gap be none for ever.
+    // Not the lower one: where the skin is closed between the lips both would coincide, and their gap always be 0.
     add("stomion_superius", deepest(between(profile, upper.up, lower.up), upper, lower));
   }
   if (lower !== undefined && chin !== undefined) add("sublabiale", deepest(between(profile, lower.up, chin.up), lower, chin, LEAST_FOLD_MM));

@@ -22,7 +22,17 @@ export function intervalOf({ parts }: Band): string {
 export function partsText(band: Band | null): string {
   if (band?.parts === undefined) return "";
   const { surgery, model, material } = band.parts;
-  return `of this surgery ${formatNumber(surgery)}, model ${formatNumber(model)}${material === null ? "" : `, material ${formatNumber(material, 2)}`}`;
+  return [`of this surgery ${formatNumber(surgery)}`, ...(model === 0 ? [] : [`model ${formatNumber(model)}`]), ...(material === null ? [] : [`material ${formatNumber(material, 2)}`])].join(", ");
+}
+
+/** Half the interval: "± 1.7"; "" where none is known. */
+export function plusMinus(band: Band | null): string {
+  return band === null ? "" : `± ${formatNumber((band.highest - band.lowest) / 2)}`;
+}
+
+/** What a whole band says, below `where`. */
+export function wholeBandText(where: string): string {
+  return `Below ${where}: where 95 of 100 patients will be if surgery and model err as published, and the material as the case states.`;
 }
 
 /** Of a length, which is at least 0: "5.4 to 6.5". */
@@ -46,7 +56,7 @@ export function whyNot(result: MeasureResult, label: (name: string) => string): 
   return result.kind === "impossible" ? result.text : "";
 }
 
-/** Before, after, difference; empty where there is none. */
+/** Before, after, difference; empty without a value. */
 export function valueTexts(result: MeasureResult): [string, string, string] {
   if (result.kind !== "value") return ["", "", ""];
   const { before, after } = result;

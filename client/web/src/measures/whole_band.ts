@@ -7,7 +7,7 @@ import { type Vector, add, apply, cross, fromRotationVector, multiply, norm, sca
 import { pointAt } from "../geometry/rigid_fit";
 import { type Anchor, anchorPoint, corners } from "./anchor";
 import type { Band, BandParts, MeasureResult } from "./evaluation";
-import { type ShownFace, measureAt, shownPoint } from "./face_measures";
+import { type ShownFace, measureAt, measureFace, shownPoint } from "./face_measures";
 
 /**
  * Standard deviations, as core/mechanics/uncertainty/surgery_expansion.h and client/cli/shared/total_band.h have them (a test
@@ -27,7 +27,8 @@ const NORMAL_95 = 1.96;
 const STEP = 0.1;
 /** The front of a segment is the mean of this part of its vertices, the foremost ones. */
 const FRONT_PART = 10;
-const LIPS = new Set(["labrale_superius", "stomion_superius", "labrale_inferius", "stomion_inferius"]);
+/** Landmarks of the lips. */
+export const LIPS = new Set(["labrale_superius", "stomion_superius", "labrale_inferius", "stomion_inferius"]);
 const RADIANS = Math.PI / 180;
 
 /** What is asked of who knows the plan's answers. */
@@ -39,50 +40,85 @@ export interface PlanAnswers {
   skinAt(poses: readonly Pose[]): Promise<((surface: number) => Float32Array) | null>;
 }
 
+/** A place of the face that numbers are made of. */
+export interface Place {
+  /** Bone lies where it is put: the model is in doubt for skin alone. */
+  skin: { isLip: boolean; normal: Vector } | null;
+  /** As it is shown, LPS. */
+  shown: Vector;
+  under(skin: (surface: number) => Float32Array, poses: ReadonlyMap<string, Pose>): Vector;
+}
+
+/** Numbers by name, of places that go by name. */
+export interface PlacedNumbers {
+  places: ReadonlyMap<string, Place>;
+  numbersAt(at: (place: string) => Vector): ReadonlyMap<string, number>;
+}
+
 /**
- * Of each measure the interval in which it stays in 95 of 100 cases: surgery, model and material together, all independent and in
- * first order. Where no band of the material is known the interval is without it. Null where the page cannot answer.
+ * Of each number half the intervals that surgery and the model alone cause in 95 of 100 cases, all deviations independent and in
+ * first order. Null where the page cannot answer, and where the plan moves nothing: the pre-operative face is known.
  */
-export async function wholeBands(face: ShownFace, answers: PlanAnswers): Promise<Map<string, Band> | null> {
-  const places = new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, shownPoint(face, anchor)]));
-  const shown = measureAt(face, (name) => places.get(name) as Vector);
+export async function doubtOf(file: CaseFile, numbers: PlacedNumbers, answers: PlanAnswers): Promise<Map<string, Omit<BandParts, "material">> | null> {
+  const planned = answers.poses();
+  if (planned.every(isAtRest)) return null;
+  const shown = numbers.numbersAt((name) => placeNamed(numbers, name).shown);
   const [surgery, model]: Map<string, number>[] = [new Map(), new Map()];
-  const addChange = (variances: Map<string, number>, from: readonly MeasureResult[], to: readonly MeasureResult[], perDeviation: number) => {
-    to.forEach((result, index) => {
-      const before = from[index];
-      if (result.kind !== "value" || before.kind !== "value") return;
-      const change = (result.after - before.after) * perDeviation;
-      variances.set(result.definition.name, (variances.get(result.definition.name) ?? 0) + change * change);
-    });
+  const addChange = (variances: Map<string, number>, from: ReadonlyMap<string, number>, to: ReadonlyMap<string, number>, perDeviation: number) => {
+    for (const [name, after] of to) {
+      const before = from.get(name);
+      if (before !== undefined) variances.set(name, (variances.get(name) ?? 0) + ((after - before) * perDeviation) ** 2);
+    }
   };
-  const measureUnder = async (poses: readonly Pose[]) => {
+  const numbersUnder = async (poses: readonly Pose[]) => {
     const skin = await answers.skinAt(poses);
     const byHandle = new Map(answers.handles.map(({ name }, index) => [name, poses[index]]));
-    return skin === null ? null : measureAt(face, (_, anchor) => placeUnder(face, anchor, skin, byHandle));
+    return skin === null ? null : numbers.numbersAt((name) => placeNamed(numbers, name).under(skin, byHandle));
   };
   // What is shown may be the server's full answer: differences are of answers of one kind.
-  const planned = answers.poses();
-  const asPlanned = await measureUnder(planned);
+  const asPlanned = await numbersUnder(planned);
   if (asPlanned === null) return null;
-  for (const poses of missedPoses(face, answers.handles, planned)) {
-    const missedBy = await measureUnder(poses);
+  for (const poses of missedPoses(file, answers.handles, planned)) {
+    const missedBy = await numbersUnder(poses);
     if (missedBy === null) return null;
     addChange(surgery, asPlanned, missedBy, 1 / STEP);
   }
-  for (const [name, anchor] of face.landmarks.placed) {
-    if (face.file.surfaces[anchor.surface].entry.kind !== "skin") continue;
-    const shifted = add(places.get(name) as Vector, scaled(normalAt(face, anchor), STEP));
-    addChange(model, shown, measureAt(face, (other) => (other === name ? shifted : (places.get(other) as Vector))), (LIPS.has(name) ? DEVIATIONS.lipsMm : DEVIATIONS.modelMm) / STEP);
+  for (const [name, { skin, shown: place }] of numbers.places) {
+    if (skin === null) continue;
+    const shifted = add(place, scaled(skin.normal, STEP));
+    const off = numbers.numbersAt((other) => (other === name ? shifted : placeNamed(numbers, other).shown));
+    addChange(model, shown, off, (skin.isLip ? DEVIATIONS.lipsMm : DEVIATIONS.modelMm) / STEP);
   }
   const partOf = (variances: Map<string, number>, name: string) => NORMAL_95 * Math.sqrt(variances.get(name) ?? 0);
-  return new Map(shown.flatMap((result): [string, Band][] => {
-    if (result.kind !== "value") return [];
-    const { name } = result.definition;
-    return [[name, bandAround(result.after, { surgery: partOf(surgery, name), model: partOf(model, name), material: ofMaterial(result) })]];
+  return new Map(Array.from(shown.keys(), (name) => [name, { surgery: partOf(surgery, name), model: partOf(model, name) }]));
+}
+
+function placeNamed({ places }: PlacedNumbers, name: string): Place {
+  return places.get(name) as Place;
+}
+
+/**
+ * Of each measure the interval in which it stays in 95 of 100 cases: surgery, model and material together. Where no band of the
+ * material is known the interval is without it. Null where the page cannot answer.
+ */
+export async function wholeBands(face: ShownFace, answers: PlanAnswers): Promise<Map<string, Band> | null> {
+  const places = new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, placeOf(face, anchor, LIPS.has(name))]));
+  const numbersAt = (at: (name: string) => Vector) => new Map(measureAt(face, at).flatMap((result): [string, number][] => (result.kind === "value" ? [[result.definition.name, result.after]] : [])));
+  const doubts = await doubtOf(face.file, { places, numbersAt }, answers);
+  if (doubts === null) return null;
+  return new Map(measureFace(face).flatMap((result): [string, Band][] => {
+    const doubt = doubts.get(result.definition.name);
+    if (result.kind !== "value" || doubt === undefined) return [];
+    return [[result.definition.name, bandAround(result.after, { ...doubt, material: ofMaterial(result) })]];
   }));
 }
 
-function bandAround(after: number, parts: BandParts): Band {
+function isAtRest({ rotationVector, translationMm, scale }: Pose): boolean {
+  return norm(rotationVector) === 0 && norm(translationMm) === 0 && scale === 1;
+}
+
+/** The parts are independent. */
+export function bandAround(after: number, parts: BandParts): Band & { parts: BandParts } {
   const half = Math.hypot(parts.surgery, parts.model, parts.material ?? 0);
   return { lowest: after - half, highest: after + half, parts };
 }
@@ -93,10 +129,19 @@ function ofMaterial(result: MeasureResult): number | null {
   return (result.band.highest - result.band.lowest) / 2;
 }
 
+/** An anchor as a place. */
+export function placeOf(face: ShownFace, anchor: Anchor, isLip: boolean): Place {
+  return {
+    skin: face.file.surfaces[anchor.surface].entry.kind === "skin" ? { isLip, normal: normalAt(face, anchor) } : null,
+    shown: shownPoint(face, anchor),
+    under: (skin, poses) => placeUnder(face, anchor, skin, poses),
+  };
+}
+
 /** Each with one segment a part of a standard deviation beside its pose, in one of six ways. */
-function* missedPoses(face: ShownFace, handles: PlanAnswers["handles"], planned: readonly Pose[]): Generator<Pose[]> {
+function* missedPoses(file: CaseFile, handles: PlanAnswers["handles"], planned: readonly Pose[]): Generator<Pose[]> {
   for (const [index, { name }] of handles.entries()) {
-    const front = movedPoint(planned[index], frontOf(face.file, name));
+    const front = movedPoint(planned[index], frontOf(file, name));
     for (const axis of [0, 1, 2]) {
       const along = [0, 0, 0].map((_, k) => (k === axis ? 1 : 0)) as Vector;
       const shift = scaled(along, STEP * DEVIATIONS.translationMm[axis]);

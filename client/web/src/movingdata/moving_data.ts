@@ -31,7 +31,7 @@ export interface MovingHandle extends HandleEntry {
 
 /** No name, date or identifier: what is not here is not in the file. */
 export interface MovingData {
-  /** "" unless somebody asked for one. */
+  /** "" unless the user gave one. */
   title: string;
   software: string;
   model: string;

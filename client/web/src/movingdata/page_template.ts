@@ -8,7 +8,7 @@ export const TEMPLATE_FILE = "moving-file.html";
 const ENVELOPE_MARK = "@TISSUEFORM-ENVELOPE@";
 const PAYLOAD_MARK = "@TISSUEFORM-PAYLOAD@";
 
-/** The file that moves. Throws an Error where `template` is none. */
+/** The file that moves. Throws an Error if `template` is not the page's template. */
 export function fillTemplate(template: string, { envelope, payload }: Sealed): string {
   const [head, between, tail] = splitAt(template, [ENVELOPE_MARK, PAYLOAD_MARK]);
   return [head, JSON.stringify(envelope), between, toBase64(payload), tail].join("");

@@ -3,7 +3,7 @@
 
 /** A 3-D photograph as it was read: no name of a file or a patient. */
 export interface Photograph {
-  /** #V by 3; each point once, whatever the texture does there. */
+  /** #V by 3; each point once, also at a seam of the texture. */
   positions: Float32Array<ArrayBuffer>;
   /** #D: place in `positions` of each drawn vertex. More than #V where the texture has seams. */
   drawn: Uint32Array<ArrayBuffer>;
@@ -11,9 +11,9 @@ export interface Photograph {
   triangles: Uint32Array<ArrayBuffer>;
   /** #D by 2, from the lower left corner of the image; null: shape only, or colors. */
   uv: Float32Array<ArrayBuffer> | null;
-  /** #D by 3, sRGB; null where there are none. */
+  /** #D by 3, sRGB; null without colors. */
   colors: Uint8Array<ArrayBuffer> | null;
-  /** A JPEG, PNG or WebP file; null where there is none. */
+  /** A JPEG, PNG or WebP file; null without an image. */
   image: Uint8Array<ArrayBuffer> | null;
 }
 

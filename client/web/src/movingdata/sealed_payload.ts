@@ -54,7 +54,7 @@ export async function checkWhole({ envelope, payload }: Sealed): Promise<void> {
   if (payload.length !== envelope.bytes || (await sha256(payload)) !== envelope.sha256) throw new DamagedError();
 }
 
-/** The data of a payload that is whole. `password`: "" where there is none. Throws a WrongPasswordError or a DamagedError. */
+/** The data of a payload that is whole. `password`: "" without one. Throws a WrongPasswordError or a DamagedError. */
 export async function unseal({ envelope, payload }: Sealed, password: string): Promise<Uint8Array<ArrayBuffer>> {
   const packed = envelope.encryption === undefined ? payload : await decrypt(envelope.encryption, payload, password);
   try {
@@ -119,7 +119,7 @@ export function toBase64(bytes: Uint8Array): string {
   return text;
 }
 
-/** Throws a DamagedError where it is none. */
+/** Throws a DamagedError if the text is not base64. */
 export function fromBase64(text: string): Uint8Array<ArrayBuffer> {
   try {
     const binary = atob(text);

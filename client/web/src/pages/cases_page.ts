@@ -45,7 +45,7 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, onNew
   };
   const newPlan = button("New plan from a CT", () => onNewPlan(null));
   newPlan.hidden = true;
-  // A server that builds no plans answers with an error, and an older one, too: neither is told.
+  // A server that builds no plans answers with an error, and an older one, too: the page reports neither.
   void gateway.planBuilds.listPlanBuilds({ pageSize: 1 }).then(() => (newPlan.hidden = false), () => {});
   void showList();
   return el("main", { class: "start" }, [

@@ -8,7 +8,7 @@ import type { BuildDraft } from "../generated/tissueform/v1/plan_build_service_p
 import { button, el } from "../panels/dom";
 import { formatBytes } from "../planning/numbers";
 
-/** Received CTs that wait for a plan; hidden as long as there are none. A server that builds no plans has none, and an older one, too. */
+/** Received CTs that wait for a plan; hidden while the list is empty, as it is with a server that builds no plans, or an older one. */
 export function draftsList(gateway: Gateway, onOpen: (draft: BuildDraft) => void, onProblem: (text: string) => void): HTMLElement {
   const list = el("ul", { class: "cases drafts" });
   const element = el("section", { attributes: { "aria-label": "Drafts" } }, [

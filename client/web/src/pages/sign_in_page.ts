@@ -4,7 +4,7 @@
 import type { Login } from "../login/login";
 import { button, el, whileBusy } from "../panels/dom";
 
-/** What somebody sees who is not signed in; `problem`: why, "" where nothing went wrong. */
+/** The page for a user who is not signed in; `problem`: why, "" where nothing went wrong. */
 export function signInPage(login: Login, problem: string): HTMLElement {
   const start = button("Sign in", () => void whileBusy(start, () => login.signIn(), () => {}), { attributes: { type: "submit" } });
   return el("main", { class: "start" }, [

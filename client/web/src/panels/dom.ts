@@ -34,7 +34,7 @@ export function section(title: string, children: Child[], properties: Properties
   return el("section", { ...properties, attributes: { "aria-label": title, ...properties.attributes } }, [heading, ...children]);
 }
 
-/** A part of the side panel that is opened by its heading; `onOpen` is told when it is. */
+/** A part of the side panel that is opened by its heading; it calls `onOpen` when it opens or closes. */
 export function collapsible(title: string, children: Child[], onOpen: (isOpen: boolean) => void = () => {}): HTMLDetailsElement {
   const summary = el("summary", {}, [el("h2", { text: title })]);
   const details = el("details", { class: "part", attributes: { role: "group", "aria-label": title } }, [summary, el("div", {}, children)]);
@@ -65,7 +65,7 @@ export function newId(prefix: string): string {
   return `${prefix}-${++count}`;
 }
 
-/** Runs what may fail while `control` cannot be pressed again; `onError` is told a sentence. */
+/** Runs what may fail while `control` cannot be pressed again; `onError` receives what was thrown. */
 export async function whileBusy(control: HTMLButtonElement, run: () => Promise<void>, onError: (thrown: unknown) => void): Promise<void> {
   control.disabled = true;
   try {

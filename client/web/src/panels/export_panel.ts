@@ -5,7 +5,7 @@ import { messageOf } from "../calls/call_error";
 import { download, toPly, toPng, toStl } from "../exports/files";
 import { CASE_FILE, plannedRanges } from "../exports/case_plan";
 import { exportedSurfaces, planDocument, provenanceLines } from "../exports/plan_export";
-import { measureAtRest } from "../measures/rest_measures";
+import { measureAtRest, movementBandsAtRest } from "../measures/rest_measures";
 import type { Workbench } from "../workbench/workbench";
 import { button, el, section, whileBusy } from "./dom";
 import { movingFilePart } from "./moving_file_part";
@@ -29,7 +29,8 @@ export function exportPanel(bench: Workbench): HTMLElement {
   };
   const plan = async () => {
     const ranges = await plannedRanges(bench.file);
-    save("tissueform-plan.json", "application/json", planDocument(bench, await measureAtRest(bench, bench.planAnswers), ranges));
+    const atRest = { measures: await measureAtRest(bench, bench.planAnswers), movements: await movementBandsAtRest(bench, bench.planAnswers) };
+    save("tissueform-plan.json", "application/json", planDocument(bench, atRest, ranges));
   };
   return section("Export", [
     el("div", { class: "buttons" }, [

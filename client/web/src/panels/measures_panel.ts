@@ -5,11 +5,12 @@ import { hasHeadFrame } from "../measures/face_point";
 import { labelOf, measureFace } from "../measures/face_measures";
 import type { MeasureResult } from "../measures/evaluation";
 import { measureAtRest } from "../measures/rest_measures";
-import { bandText, normText, partsText, unitText, valueTexts, whyNot } from "../measures/texts";
+import { bandText, normText, partsText, unitText, valueTexts, wholeBandText, whyNot } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
 import { collapsible, el, throttleToFrame } from "./dom";
 import { landmarksPart } from "./landmarks_part";
 import { ownMeasuresPart } from "./own_measures_part";
+import { Rest } from "./rest";
 
 /** The face in numbers: a table, the landmarks that it is made from, and distances and angles of one's own. */
 export function measuresPanel(bench: Workbench): HTMLElement {
@@ -18,24 +19,16 @@ export function measuresPanel(bench: Workbench): HTMLElement {
   const caption = el("caption");
   const table = el("table", { class: "measures" }, [caption, el("thead", {}, [el("tr", {}, heads)]), body]);
   const landmarks = landmarksPart(bench);
-  let resting: ReturnType<typeof setTimeout> | undefined;
-  let shownCount = 0;
+  const rest = new Rest();
   const draw = (results: readonly MeasureResult[]) => {
     body.replaceChildren(...results.map((result) => row(bench, result)));
     caption.textContent = captionOf(bench, results);
   };
-  const drawAtRest = async () => {
-    const asked = shownCount;
-    const results = await measureAtRest(bench, bench.planAnswers);
-    if (asked === shownCount) draw(results);
-  };
   const show = () => {
-    shownCount += 1;
-    clearTimeout(resting);
+    rest.over();
     if (!panel.open) return;
     draw(measureFace(bench));
-    // A band that cannot be found leaves that of the material.
-    if (bench.showsPlan) resting = setTimeout(() => void drawAtRest().catch(() => {}), REST_MS);
+    if (bench.showsPlan) rest.begin(() => measureAtRest(bench, bench.planAnswers), draw);
   };
   const panel: HTMLDetailsElement = collapsible("Measures", [table, landmarks.element, ownMeasuresPart(bench)], (isOpen) => {
     landmarks.show(isOpen);
@@ -46,15 +39,12 @@ export function measuresPanel(bench: Workbench): HTMLElement {
   return panel;
 }
 
-/** The hand rests: the band takes some dozens of answers. */
-const REST_MS = 400;
-
 function captionOf(bench: Workbench, results: readonly MeasureResult[]): string {
   const bands = results.flatMap((result) => (result.kind === "value" && result.band !== null ? [result.band] : []));
   const [hasBand, isWhole] = [bands.length > 0, bands.some(({ parts }) => parts !== undefined)];
   return [
     `In the ${hasHeadFrame(bench.file) ? "head frame" : "scanner axes (no head frame was found)"}; forward, up and the patient’s left are positive.`,
-    isWhole ? "Below “after”: where 95 of 100 patients will be if surgery and model err as published, and the material as the case states. Below a name: how far each of them alone would reach." : "",
+    isWhole ? `${wholeBandText("“after”")} Below a name: how far each of them alone would reach.` : "",
     hasBand && !isWhole ? "Below “after”: 95 % interval, material uncertainty only." : "",
     !isWhole && bench.hasBand && bench.whyNoBand !== "" ? `No 95 % interval: ${bench.whyNoBand}.` : "",
     bench.showsPlan ? "" : `The face that is shown is not the plan’s${hasBand ? "" : "; it has no 95 % interval"}.`,

@@ -3,10 +3,13 @@
 
 import { landmarkMovements } from "../measures/face_measures";
 import { cell, describeMovement } from "../planning/landmarks";
-import { formatNumber } from "../planning/numbers";
-import { lengthBand } from "../measures/texts";
+import type { Band } from "../measures/evaluation";
+import type { MovementBand } from "../measures/movement_bands";
+import { movementBandsAtRest } from "../measures/rest_measures";
+import { bandText, partsText, plusMinus, wholeBandText } from "../measures/texts";
 import type { Workbench } from "../workbench/workbench";
 import { el, throttleToFrame, section } from "./dom";
+import { Rest } from "./rest";
 
 function captionOf(source: string): string {
   const frame = source === "scanner" ? " Directions are the scanner’s: no head frame was found." : "";
@@ -24,23 +27,45 @@ export function movementsPanel(bench: Workbench): HTMLElement {
   const caption = el("caption");
   const rows = landmarks.map((landmark) => {
     const cells = Array.from({ length: 4 }, () => el("td"));
-    const row = el("tr", {}, [el("th", { text: landmark.label, attributes: { scope: "row" } }), ...cells]);
-    return { row, cells };
+    const parts = el("small");
+    const row = el("tr", {}, [el("th", { attributes: { scope: "row" } }, [landmark.label, parts]), ...cells]);
+    return { row, parts, cells };
   });
-  const show = () => {
+  // `whole`: null while the hand moves, and where they are not known.
+  const draw = (whole: readonly (MovementBand | null)[] | null) => {
     const movements = landmarkMovements(bench);
-    const hasBand = movements.some(({ bandMm }) => bandMm !== null);
-    caption.textContent = `${captionOf(headFrame.source)}${!hasBand ? "" : " Below a number of the skin: 95 % interval, material uncertainty only."}`;
-    rows.forEach(({ row, cells }, index) => {
-      const { bandMm, ...movement } = movements[index];
-      const plusMinus = bandMm === null ? "" : `± ${formatNumber(bandMm)}`;
-      [movement.forwardMm, movement.leftMm, movement.upMm].forEach((value, column) => fill(cells[column], cell(value), plusMinus));
-      fill(cells[3], cell(movement.totalMm), bandMm === null ? "" : lengthBand(movement.totalMm, bandMm));
-      row.title = `${describeMovement(movement)}${bandMm === null ? "" : `, 95 % interval (stiffness only) ${plusMinus} mm`}`;
+    caption.textContent = [captionOf(headFrame.source), bandCaption(whole, movements.some(({ bandMm }) => bandMm !== null))].filter((text) => text !== "").join(" ");
+    rows.forEach(({ row, parts, cells }, index) => {
+      const movement = movements[index];
+      const band = whole === null ? materialBand(movement) : whole[index];
+      WAYS.forEach((way, column) => fill(cells[column], cell(movement[way]), plusMinus(band?.[way] ?? null)));
+      fill(cells[3], cell(movement.totalMm), bandText(band?.totalMm ?? null));
+      parts.textContent = partsText(band?.totalMm ?? null);
+      row.title = describeMovement(movement);
     });
+  };
+  const rest = new Rest();
+  const show = () => {
+    rest.over();
+    draw(null);
+    if (bench.showsPlan && landmarks.length > 0) rest.begin(() => movementBandsAtRest(bench, bench.planAnswers), draw);
   };
   bench.shown.watch(throttleToFrame(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "Total"].map((text) => el("th", { text, attributes: { scope: "col" } }));
-  const table = el("table", {}, [caption, el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
+  const table = el("table", { class: "movements" }, [caption, el("thead", {}, [el("tr", {}, heads)]), el("tbody", {}, rows.map(({ row }) => row))]);
   return section("Movements", [landmarks.length === 0 ? el("p", { class: "quiet", text: "The case has no landmarks." }) : table]);
+}
+
+const WAYS = ["forwardMm", "leftMm", "upMm"] as const;
+
+function bandCaption(whole: readonly (MovementBand | null)[] | null, hasMaterial: boolean): string {
+  if (whole !== null) return `${wholeBandText("a number")} Below a name: how far each of them alone would reach in the total.`;
+  return hasMaterial ? "Below a number of the skin: 95 % interval, material uncertainty only." : "";
+}
+
+/** That of the material alone; null for bone, and where none is known. */
+function materialBand({ bandMm, ...movement }: ReturnType<typeof landmarkMovements>[number]): Record<keyof MovementBand, Band> | null {
+  if (bandMm === null) return null;
+  const about = (value: number, least = -Infinity): Band => ({ lowest: Math.max(least, value - bandMm), highest: value + bandMm });
+  return { forwardMm: about(movement.forwardMm), leftMm: about(movement.leftMm), upMm: about(movement.upMm), totalMm: about(movement.totalMm, 0) };
 }

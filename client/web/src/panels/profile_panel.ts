@@ -7,7 +7,7 @@ import { ProfileDrawing, svgText, toPicture } from "../exports/profile_svg";
 import type { Workbench } from "../workbench/workbench";
 import { button, collapsible, el, throttleToFrame } from "./dom";
 
-/** The midsagittal section before and after, drawn anew as the face moves while it is open. */
+/** The midsagittal section before and after, redrawn as the face moves while it is open. */
 export function profilePanel(bench: Workbench): HTMLElement {
   const sheet = el("div", { class: "profile" });
   let drawing: ProfileDrawing | null = null;

@@ -6,7 +6,7 @@ import type { Connection } from "../live/live_session";
 import type { FollowLinks } from "../live/follow_links";
 import { button, el, whileBusy } from "./dom";
 
-/** "nobody follows", "2 follow" */
+/** "no followers", "2 follow" */
 export function followersText(count: number): string {
   if (count === 0) return "no followers";
   return count === 1 ? "one follows" : `${count} follow`;
@@ -28,7 +28,7 @@ export interface StatusBarParts {
   links: FollowLinks | null;
   onLeave: (() => void) | null;
   onRetry: (() => void) | null;
-  /** Who is signed in; null where nobody is. */
+  /** The signed-in user; null if no user is signed in. */
   account: HTMLElement | null;
 }
 

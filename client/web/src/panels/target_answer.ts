@@ -8,7 +8,7 @@ import { numberName, targetSentences } from "../workbench/target_sentences";
 import type { Workbench } from "../workbench/workbench";
 import { button, collapsible, el } from "./dom";
 
-/** What becomes of the targets: reached or missed, what holds back, how well each number is told; and to accept or reject it. */
+/** The result for the targets: reached or missed, what holds back, how well each number is determined; and to accept or reject it. */
 export function targetAnswer(bench: Workbench): HTMLElement {
   const fit = bench.targets;
   const told = el("div", { class: "target-told", attributes: { role: "status" } });

@@ -131,7 +131,7 @@ function triangleNormals({ positions, triangles }: Triangles): Float32Array {
   return normals;
 }
 
-/** Distance to a triangle; `out`: weights of its nearest point. As measures/anchor.ts, without making arrays: this runs millions of times. */
+/** Distance to a triangle; `out`: weights of its nearest point. As measures/anchor.ts, without allocations: it runs millions of times. */
 function closest(p: ArrayLike<number>, a: number, b: number, c: number, x: number, y: number, z: number, out: Float64Array): number {
   const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
   const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];

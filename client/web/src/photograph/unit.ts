@@ -3,7 +3,7 @@
 
 import { bounds } from "./triangle_grid";
 
-/** "unknown": the size is none of a head. */
+/** "unknown": the size does not fit a head in any unit. */
 export type Unit = "mm" | "cm" | "m" | "unknown";
 
 /** A photograph of a face alone, or of a head with shoulders. */

@@ -31,13 +31,18 @@ export function landmarkMovement(
   skinMove: (vertex: number) => Vector,
   frame: HeadFrame,
 ): LandmarkMovement {
-  const { label, handle, positionMm, skinVertex } = landmark;
+  const { handle, positionMm, skinVertex } = landmark;
   const pose = poses.get(handle);
   let moved: Vector = [0, 0, 0];
   if (pose !== undefined) moved = subtract(movedPoint(pose, positionMm), positionMm);
   else if (isOnSkin(landmark)) moved = skinMove(skinVertex as number);
+  return { label: landmark.label, ...movementOf(moved, frame) };
+}
+
+/** Of a way in LPS, mm. */
+export function movementOf(moved: Vector, frame: HeadFrame): Omit<LandmarkMovement, "label"> {
   const [left, posterior, up] = apply(headAxes(frame), moved);
-  return { label, forwardMm: -posterior, leftMm: left, upMm: up, totalMm: norm(moved) };
+  return { forwardMm: -posterior, leftMm: left, upMm: up, totalMm: norm(moved) };
 }
 
 /** "8.0 mm forward, 1.2 mm up", or "at rest". */

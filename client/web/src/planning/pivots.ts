@@ -20,7 +20,7 @@ export function pivotChoices(handle: Pick<HandleEntry, "name" | "pivotMm">, land
   ];
 }
 
-/** "The case’s pivot (1.0, −2.0, 30.5)": which it is, and where, for who reads numbers that are told about it. */
+/** "The case’s pivot (1.0, −2.0, 30.5)": which it is, and where, for readers of numbers that refer to it. */
 export function pivotText(choices: readonly PivotChoice[], pivot: Vector): string {
   const place = `(${pivot.map((part) => formatNumber(part)).join(", ")})`;
   const choice = choices.find(({ value }) => value.every((part, axis) => part === pivot[axis]));

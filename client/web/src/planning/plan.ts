@@ -25,9 +25,9 @@ interface State {
 }
 
 /**
- * What the planner wants of the bone: a move for each segment about a pivot, within the case's limits, with all that was
+ * The planned moves of the bone: a move for each segment about a pivot, within the case's limits, with all that was
  * before. A change that is not final is a step of a movement of the hand: the final one that ends it is what undo takes back.
- * A preview is no step: whatever changes the plan next takes it away first.
+ * A preview is not a step: the next change of the plan takes it away first.
  */
 export class Plan {
   readonly handles: readonly HandleEntry[];
@@ -111,7 +111,7 @@ export class Plan {
     return isWithin;
   }
 
-  /** The segment stays where it is; its numbers are told about another point from now on. */
+  /** The segment stays where it is; its numbers refer to another point from now on. */
   setPivot(handle: number, pivotMm: Vector): void {
     const { moves } = this.base;
     const move = toMove(this.poses(moves)[handle], pivotMm, this.file.manifest.headFrame);

@@ -73,7 +73,7 @@ export function answerLine(bench: Pick<Workbench, "comparison" | "model" | "mode
   return `model ${model}. ${describeFace(answer, comparison) || "No answer yet."}${isOwn ? " Computed by the page; not yet confirmed by the server." : ""}`;
 }
 
-/** What the intervals of the measures hold, or why there are none. */
+/** What the intervals of the measures include, or why the measures have no intervals. */
 export function intervalLine(results: readonly MeasureResult[], why: string): string {
   const bands = results.flatMap((result) => (result.kind === "value" && result.band !== null ? [result.band] : []));
   const whole = bands.find(({ parts }) => parts !== undefined);

@@ -66,7 +66,7 @@ export class Gizmo {
     this.stage.invalidate();
   }
 
-  /** It is seen, and can be taken, while nobody hides it. */
+  /** It is visible, and can be taken, while no part of the page hides it. */
   hide(by: string, isHidden: boolean): void {
     if (isHidden) this.hiddenBy.add(by);
     else this.hiddenBy.delete(by);

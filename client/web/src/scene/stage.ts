@@ -17,7 +17,7 @@ const LOST_AGAIN = "The browser repeatedly loses the graphics card, so no pictur
 
 /** What a stage tells its owner. */
 export interface StageListener {
-  /** The camera or the size changed, or something was drawn anew. */
+  /** The camera or the size changed, or something was redrawn. */
   onDrawn(): void;
   /** The browser took the graphics card away, or gave it back. */
   onContext(isLost: boolean): void;

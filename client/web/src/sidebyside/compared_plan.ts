@@ -9,6 +9,7 @@ import type { Pose } from "../geometry/pose";
 import type { Band } from "../measures/evaluation";
 import type { ShownFace } from "../measures/face_measures";
 import type { LandmarkBook } from "../measures/landmark_book";
+import { type MovementBand, movementBands } from "../measures/movement_bands";
 import { wholeBands } from "../measures/whole_band";
 import type { Plan } from "../planning/plan";
 import { Head } from "../scene/head";
@@ -41,6 +42,8 @@ export class ComparedPlan implements ShownFace {
   shownPoses: ReadonlyMap<string, Pose> = new Map();
   /** Of `wholeBands`; null while the hand moves, and where they are not known. */
   bands: ReadonlyMap<string, Band> | null = null;
+  /** Of `movementBands`, likewise. */
+  movementBands: readonly (MovementBand | null)[] | null = null;
   /** About the face: how good it is, or why it is missing. */
   status = "";
   /** The face is the answer to the plan's movements; else it is still that of earlier ones. */
@@ -126,7 +129,7 @@ export class ComparedPlan implements ShownFace {
     this.asked += 1;
     clearTimeout(this.resting);
     if (!this.isActive) return;
-    [this.isAnswered, this.hasFailed, this.bands, this.status] = [false, false, null, "Waiting for the answer …"];
+    [this.isAnswered, this.hasFailed, this.bands, this.movementBands, this.status] = [false, false, null, null, "Waiting for the answer …"];
     this.shownPoses = this.bench.posesByHandle(this.plan.poses());
     this.head.setPoses(this.shownPoses);
     this.onShown();
@@ -171,8 +174,10 @@ export class ComparedPlan implements ShownFace {
       if (!this.isAnswered || !this.isFull) await this.solve(poses, isOver);
       if (isOver()) return;
       this.penetrations.value = this.bench.penetrationsAt(poses);
-      const bands = await wholeBands(this, { handles: this.plan.handles, poses: () => poses, skinAt: (others) => this.bench.skinAt(others) });
-      if (!isOver()) this.bands = bands;
+      const answers = { handles: this.plan.handles, poses: () => poses, skinAt: (others: readonly Pose[]) => this.bench.skinAt(others) };
+      const bands = await wholeBands(this, answers);
+      const movements = await movementBands(this, answers);
+      if (!isOver()) [this.bands, this.movementBands] = [bands, movements];
     } catch (thrown) {
       if (isOver()) return;
       this.hasFailed = true;

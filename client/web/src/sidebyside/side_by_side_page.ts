@@ -4,6 +4,7 @@
 import "../styles/side_by_side.css";
 import { button, coverPage, el, throttleToFrame } from "../panels/dom";
 import { lookByKey, undoByKey } from "../panels/keyboard";
+import { wholeBandText } from "../measures/texts";
 import { legendBox } from "../panels/maps_panel";
 import { lostBox, noPicture } from "../panels/picture_box";
 import { noticeBox } from "../panels/status_bar";
@@ -147,8 +148,8 @@ export class SideBySidePage {
     return [
       "All plans are answered by the planner’s model.",
       "Directions are those of the head frame; the numbers of a segment are about the planner’s rotation center.",
-      isWhole ? "Below a measure: where 95 of 100 patients will be if surgery and model err as published, and the material as stated." : "",
-      this.bench.hasBand ? "Below a movement: 95 % interval, material uncertainty only." : "",
+      isWhole ? wholeBandText("a measure and a landmark’s movement") : "",
+      this.bench.hasBand ? `Below ${isWhole ? "the largest movement" : "a movement"}: 95 % interval, material uncertainty only.` : "",
       missing === 0 ? "" : `${missing} measures need landmarks: confirm them in the planner, under Measures.`,
     ].filter((text) => text !== "").join(" ");
   }

@@ -118,7 +118,10 @@ function landmarkRows(plans: readonly TabledPlan[], reference: TabledPlan | null
       const other = ofReference?.[index];
       const apart = other === undefined || plan === reference ? "" : `${formatNumber(Math.hypot(movement.forwardMm - other.forwardMm, movement.leftMm - other.leftMm, movement.upMm - other.upMm))} from ${reference?.letter}`;
       const direction = movement.totalMm < 0.05 ? "" : describeMovement(movement);
-      return plain(formatNumber(movement.totalMm), [direction, bandMm === null ? "" : lengthBand(movement.totalMm, bandMm), apart]);
+      const whole = plan.movementBands;
+      const material = bandMm === null ? "" : lengthBand(movement.totalMm, bandMm);
+      const interval = whole === null ? material : bandText(whole[index]?.totalMm ?? null);
+      return plain(formatNumber(movement.totalMm), [direction, interval, apart]);
     });
     return { id: `landmark:${name}`, title: `${label}, mm`, note: "", preOp: ZERO, cells };
   });

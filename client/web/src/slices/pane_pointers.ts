@@ -146,7 +146,7 @@ export class PanePointers {
       this.owner.changed();
       return;
     }
-    // A notch of a mouse wheel is one slice, whatever the browser counts for it.
+    // A notch of a mouse wheel is one slice, regardless of what the browser counts for it.
     this.wheelPx = Math.abs(px) >= WHEEL_PX ? Math.sign(px) * WHEEL_PX : this.wheelPx + px;
     if (Math.abs(this.wheelPx) < WHEEL_PX) return;
     this.owner.scroll(this.pane, Math.sign(this.wheelPx));

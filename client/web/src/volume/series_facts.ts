@@ -81,7 +81,7 @@ function measure(places: readonly number[]) {
 
 const objectKind = (header: DicomHeader) => `${header.classUid}|${isLocalizer(header.imageType)}`;
 
-/** The images are the CT slices or, where there are none, the objects of the most frequent kind. */
+/** The images are the CT slices or, in a series without them, the objects of the most frequent kind. */
 function imagesOf(objects: readonly DicomHeader[]): DicomHeader[] {
   const counts = new Map<string, number>();
   for (const object of objects) counts.set(objectKind(object), (counts.get(objectKind(object)) ?? 0) + 1);

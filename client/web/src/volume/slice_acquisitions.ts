@@ -82,7 +82,7 @@ interface Parting {
   readonly toldBy: string;
 }
 
-/** All by which scans may be told apart, in the order in which it is tried. */
+/** All properties that may separate scans, in the order in which they are tried. */
 function* waysOf(slices: readonly DicomHeader[]): Generator<[Labels, string]> {
   const byTimes = function* (time: Time, toldBy: string): Generator<[Labels, string]> {
     for (const jumpS of largestJumps(slices, time)) yield [labelsOfJumps(slices, time, jumpS), toldBy];
@@ -97,7 +97,7 @@ function* waysOf(slices: readonly DicomHeader[]): Generator<[Labels, string]> {
   yield [labelsOf(slices, ({ acquisitionNumber }) => `${acquisitionNumber ?? -1}`), "acquisition number"];
 }
 
-/** Two at one place cannot be told apart by it. */
+/** Positions do not distinguish two slices at one place. */
 function partByPlaces(stack: Stack): Parting | null {
   if (stack.some((placed, i) => i > 0 && areAtOnePlace(stack[i - 1], placed))) return null;
   const inIt = onRegularSteps(stack);

@@ -78,7 +78,7 @@ function checkTotal(entries: readonly Entry[], zipBytes: number): void {
   if (total > RATIO_FROM_BYTES && total > MAX_RATIO * zipBytes) throw new Error(`the zip unpacks to more than ${MAX_RATIO} times its size; drop the folder instead`);
 }
 
-/** Never more than the directory states, whatever the packed bytes hold. */
+/** Never more than the directory states, regardless of the packed bytes. */
 function inflated(packed: Uint8Array, size: number): Uint8Array<ArrayBuffer> {
   const out = new Uint8Array(size);
   let at = 0;

@@ -48,13 +48,13 @@ export class FaceMap {
     }
   }
 
-  /** What is compared with, anew: another model answers other poses otherwise. */
+  /** Reads again what the face is compared with: another model answers other poses differently. */
   async refresh(): Promise<void> {
     const choice = this.choice.value;
     let other: Float32Array | null = null;
     if (choice.kind === "model") other = await this.sources.ofModel(choice.model);
     if (choice.kind === "prediction") other = await this.sources.ofPrediction(choice.prediction);
-    // Another map may have been chosen meanwhile.
+    // The user may have chosen another map since then.
     if (choice === this.choice.value) this.other = other;
   }
 

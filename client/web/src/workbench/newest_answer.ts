@@ -50,7 +50,7 @@ export class NewestAnswer {
   takeOwn({ positions, uncertainty, errorBoundMm, isEstimate }: Omit<Evaluation, "coverage">): boolean {
     if (positions.length !== this.rest.length) return false;
     subtractInto(positions, this.rest, this.displacements);
-    // Copied: the evaluator's own array becomes that of whatever it is asked next.
+    // Copied: the evaluator reuses its own array for the next evaluation.
     if (uncertainty !== null) this.ownBand.set(uncertainty);
     this.bandMm = uncertainty === null ? null : this.ownBand;
     this.taken = { by: "page", errorBoundMm, isEstimate };

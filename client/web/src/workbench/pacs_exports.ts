@@ -38,7 +38,7 @@ export class PacsExports {
     this.call.halfClose();
   }
 
-  /** Nothing is told afterwards. */
+  /** Reports nothing afterwards. */
   close(): void {
     this.isClosed = true;
     this.stopTimer?.();
@@ -66,7 +66,7 @@ export class PacsExports {
     this.byPrediction.value = left;
   }
 
-  // What was not done has come by then; what was done and what went meanwhile is asked for.
+  // Unfinished exports have come by then; the list shows which others are finished or gone since then.
   private told(): void {
     this.backoff.succeeded();
     this.list().then(
@@ -103,7 +103,7 @@ export class PacsExports {
 
   private broken(error: CallError | null): void {
     if (this.isClosed) return;
-    // A server that is older than the question; whoever may not ask.
+    // The server is too old for this call, or the user may not make it.
     if (error !== null && !error.isPassing && error.code !== Code.ResourceExhausted) {
       this.byPrediction.value = null;
       return;
@@ -117,7 +117,7 @@ function isNewer(entry: Export, known: Export): boolean {
   return entry.name === known.name ? Number(entry.etag) > Number(known.etag) : entry.name > known.name;
 }
 
-/** "stored, 7 objects": how far it is, for who plans. */
+/** "stored, 7 objects": the state of the export, for the surgeon. */
 export function exportText({ state, detail, storedObjects }: Export): string {
   const objects = `${storedObjects} ${storedObjects === 1 ? "object" : "objects"}`;
   if (state === ExportState.WAITING) return detail === "" ? "waiting for the bridge" : `waiting: ${detail}`;

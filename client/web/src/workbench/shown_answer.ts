@@ -13,7 +13,7 @@ export type ShownAnswer =
   | { by: "server"; summary: SolveSummary; isRefining: boolean }
   | ({ by: "page" } & Pick<Evaluation, "errorBoundMm" | "isEstimate">);
 
-/** How near it is to the full answer of its model, in a sentence; "" where there is none yet. */
+/** How near it is to the full answer of its model, in a sentence; "" without an answer yet. */
 export function describeAnswer(answer: ShownAnswer | null): string {
   if (answer === null) return "";
   if (answer.by === "page") return answer.isEstimate ? estimate(answer.errorBoundMm) : prepared(answer.errorBoundMm);

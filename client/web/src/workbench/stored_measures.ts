@@ -29,12 +29,12 @@ export async function storedMeasures({ file, landmarks, comparer, planned, answe
   return toMessages(await measureAtRest(new FaceOfShape(file, landmarks, shape), ofShape));
 }
 
-/** A face that nobody looks at. */
+/** A face that is not shown. */
 class FaceOfShape implements ShownFace {
   readonly shownPoses: ReadonlyMap<string, Pose>;
   /** There is no other plan beside its poses. */
   readonly showsPlan = true;
-  /** Those that somebody asked for. */
+  /** Those that were requested. */
   private readonly surfaces = new Map<number, FollowingSurface>();
 
   constructor(

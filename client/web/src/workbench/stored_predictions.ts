@@ -9,7 +9,7 @@ import type { Answers } from "./answers";
 import type { PacsExports } from "./pacs_exports";
 import { Signal } from "./signal";
 
-/** What is predicted when somebody keeps it. */
+/** What is predicted when the user stores the prediction. */
 export interface Question {
   session: string;
   model: DeformationModel;

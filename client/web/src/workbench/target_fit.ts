@@ -38,9 +38,9 @@ export function isSameMove(a: Target["move"], b: Target["move"]): boolean {
 }
 
 /**
- * The face that is targeted, and the poses that give it: asked of the server while somebody pulls, one call at a time, and of
- * targets that come meanwhile the newest only. What is found is shown by the plan and becomes a step of it when it is accepted.
- * Before any of the targets is changed nothing is asked: the face is what it is. Targets end with any other change of the plan.
+ * The face that is targeted, and the poses that give it: the server is asked while the user drags, one call at a time, and then only
+ * for the newest of the targets that came during a call. The plan shows the result, which becomes a step of it when it is accepted.
+ * Before a target is changed, no call is made: the face stays as it is. Targets end with any other change of the plan.
  */
 export class TargetFit {
   readonly targets = new Signal<readonly Target[]>([]);
@@ -57,7 +57,7 @@ export class TargetFit {
   private found: ReadonlyMap<string, Pose> | null = null;
   /** The change of the plan that is heard of is this object's own. */
   private isShowing = false;
-  /** How often targets have ended: an answer to those that did is none to those that came after them. */
+  /** How often targets have ended: an answer to ended targets does not apply to later ones. */
   private ends = 0;
 
   constructor(
@@ -172,7 +172,7 @@ export class TargetFit {
     }
   }
 
-  /** By somebody else: what was found is of a plan that is there no more. The plan has taken it away already. */
+  /** Another part of the page changed the plan: the result belongs to a plan that is gone. The plan has already removed it. */
   private planChanged(): void {
     if (this.isShowing || !this.isAsked) return;
     this.end();

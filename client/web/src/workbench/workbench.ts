@@ -45,7 +45,7 @@ export interface PictureFacts {
   summary: SolveSummary | null;
 }
 
-/** A point of a surface that somebody is asked to click. */
+/** A point of a surface that the user is asked to click. */
 export interface Picking {
   prompt: string;
   kinds: readonly SurfaceKind[];
@@ -413,7 +413,7 @@ export class Workbench implements ShownFace {
   private async redraw(): Promise<void> {
     const comparison = this.comparison.value;
     const shape = comparison === null ? this.planned : await this.comparer.between(comparison, this.planned);
-    // Another comparison may have been chosen meanwhile.
+    // The user may have chosen another comparison since then.
     if (comparison !== this.comparison.value) return;
     this.lay(shape);
     this.setPoses(shape.poses);

@@ -16,7 +16,7 @@ const SURFACES = [
   { name: "chin", positions: Float32Array.from([5, 5, 5, 6, 5, 5, 5, 6, 5]), triangles: Uint32Array.from([0, 1, 2]), bandMm: null },
 ];
 
-/** What meshio, which nobody here wrote, reads: numbers of points and triangles, sum of coordinates. */
+/** What meshio, an independent reader, reads: numbers of points and triangles, sum of coordinates. */
 function readBack(name: string, bytes: Uint8Array): string {
   const path = join(folder, name);
   writeFileSync(path, bytes);

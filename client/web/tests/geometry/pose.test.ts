@@ -30,7 +30,7 @@ describe("pitch, roll and yaw", () => {
     const expected = fromRotationVector(entry.rotation_vector_deg.map((part) => (part * Math.PI) / 180) as Vector);
     fromRotationVector(pose.rotationVector).forEach((part, i) => expect(part).toBeCloseTo(expected[i], 12));
     const back = toMove(pose, [1, 2, 3], frame);
-    // Of a turn with pitch 90 degrees the same rotation may be told by other angles: then yaw is 0.
+    // Of a turn with pitch 90 degrees other angles may describe the same rotation: then yaw is 0.
     if (Math.abs(entry.pitch_deg) < 90) {
       expect(back.pitchDeg).toBeCloseTo(entry.pitch_deg, 9);
       expect(Math.cos(((back.rollDeg - entry.roll_deg) * Math.PI) / 180)).toBeCloseTo(1, 12);

@@ -3,17 +3,12 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
-import { openCase } from "../../src/case/case_file";
-import type { Pose } from "../../src/geometry/pose";
 import { movedPoint } from "../../src/geometry/pose";
 import { pointAt } from "../../src/geometry/rigid_fit";
 import { type Vector, add, apply, cross, fromRotationVector, norm, scaled, subtract } from "../../src/geometry/rotation";
 import { anchorPoint, corners } from "../../src/measures/anchor";
-import type { ShownFace } from "../../src/measures/face_measures";
-import { LandmarkBook } from "../../src/measures/landmark_book";
-import { DEVIATIONS, type PlanAnswers, wholeBands } from "../../src/measures/whole_band";
-import { Plan } from "../../src/planning/plan";
-import { smallCase, sourceOf } from "../testing/small_case";
+import { DEVIATIONS, wholeBands } from "../../src/measures/whole_band";
+import { faceThatFollows } from "../testing/following_face";
 
 const ROOT = new URL("../../../../", import.meta.url);
 const numbers = (text: string | undefined) => (text ?? "").split(",").map(Number);
@@ -27,33 +22,6 @@ test("the deviations are those of the command", () => {
   expect(/\{\{"lower_lip", ([0-9.]+)\}, \{"upper_lip", ([0-9.]+)\}\}/.exec(model)?.slice(1).map(Number)).toEqual([DEVIATIONS.lipsMm, DEVIATIONS.lipsMm]);
 });
 
-/** Skin and a lower jaw: the skin goes with the jaw by `share` of its way. */
-async function face(share: number, bandMm: number | null) {
-  const file = await openCase(sourceOf(smallCase()));
-  const landmarks = new LandmarkBook(file);
-  landmarks.place("soft_pogonion", { surface: 0, triangle: 0, weights: [0.2, 0.3, 0.5] });
-  landmarks.place("lower_midline", { surface: 1, triangle: 0, weights: [1, 0, 0] });
-  const plan = new Plan(file);
-  plan.change(0, { forwardMm: 4, yawDeg: 3 }, true);
-  const skinUnder = (poses: readonly Pose[]) => (surface: number) => {
-    const rest = file.surfaces[surface].positions;
-    return Float32Array.from({ length: rest.length }, (_, i) => {
-      const point = pointAt(rest, Math.floor(i / 3));
-      return point[i % 3] + share * (movedPoint(poses[0], point)[i % 3] - point[i % 3]);
-    });
-  };
-  const shown: ShownFace = {
-    file,
-    landmarks,
-    positionsOf: (surface) => skinUnder(plan.poses())(surface),
-    shownPoses: new Map([["mandible", plan.poses()[0]]]),
-    bandOf: (surface) => (bandMm === null ? null : new Float32Array(file.surfaces[surface].positions.length / 3).fill(bandMm)),
-    showsPlan: true,
-  };
-  const answers: PlanAnswers = { handles: plan.handles, poses: () => plan.poses(), skinAt: async (poses) => skinUnder(poses) };
-  return { file, shown, answers, plan };
-}
-
 /** A generator that gives the same numbers in every run (mulberry32), and from it the normal distribution. */
 function normals(seed: number): () => number {
   const uniform = () => {
@@ -66,7 +34,7 @@ function normals(seed: number): () => number {
 }
 
 test("surgery and model together are what thousands of simulated operations show", async () => {
-  const { file, shown, answers, plan } = await face(0.7, null);
+  const { file, shown, answers, plan } = await faceThatFollows(0.7, null);
   const bands = await wholeBands(shown, answers);
   const draw = normals(7);
   const jaw = file.surfaces.filter(({ entry }) => entry.handle === "mandible").flatMap(({ positions }) => Array.from({ length: positions.length / 3 }, (_, v) => pointAt(positions, v)));
@@ -100,8 +68,8 @@ test("surgery and model together are what thousands of simulated operations show
 });
 
 test("the band of the material makes it wider, as independent parts add", async () => {
-  const without = await face(0.7, null);
-  const withBand = await face(0.7, 2);
+  const without = await faceThatFollows(0.7, null);
+  const withBand = await faceThatFollows(0.7, 2);
   const half = async ({ shown, answers }: typeof without) => {
     const band = (await wholeBands(shown, answers))?.get("chin_midline");
     return ((band?.highest ?? NaN) - (band?.lowest ?? NaN)) / 2;
@@ -116,6 +84,6 @@ test("the band of the material makes it wider, as independent parts add", async 
 });
 
 test("where the page has no answers there is none", async () => {
-  const { shown, answers } = await face(0.7, null);
+  const { shown, answers } = await faceThatFollows(0.7, null);
   expect(await wholeBands(shown, { ...answers, skinAt: async () => null })).toBeNull();
 });

@@ -36,6 +36,7 @@ function plan(file: CaseFile, landmarks: LandmarkBook, { letter, move, skinMm, o
     plan: moves,
     isAnswered,
     bands: null,
+    movementBands: null,
     status: "",
     showsPlan: true,
     uncertainty: null,

@@ -176,7 +176,7 @@ function gltf(surfaces: readonly Surface[], views: unknown[], binBytes: number, 
   };
 }
 
-/** What the page takes for granted where it is missing, and C++ wants to be told. */
+/** Values that the page assumes if they are missing, and that C++ requires. */
 const COMPLETE = {
   pose: { rotation_vector_deg: [0, 0, 0], pivot_mm: [0, 0, 0], translation_mm: [0, 0, 0], scale: 1 },
   limits: { translation_mm: 20, rotation_deg: 30 },

@@ -7,7 +7,7 @@ import { deflateSync } from "node:zlib";
 import type { Vector } from "../../src/geometry/rotation";
 
 // A synthetic photograph of the bundled head: its skin as seen from the front, with lips, brows and eyes painted where the
-// landmarks are. For tests and the pictures of the documents; nobody was photographed.
+// landmarks are. For tests and the pictures of the documents; it shows no real person.
 
 const HEAD = fileURLToPath(new URL("../../../../tests/data/plans/three_segments/viewer.glb", import.meta.url));
 const SIZE = 512;

@@ -15,7 +15,7 @@ import { smallCase, sourceOf } from "../testing/small_case";
 const STORED_MM = 2;
 const BAND_MM = 0.25;
 
-/** A prediction whose skin lies 2 mm to the left and whose jaw 3 mm, and whose band the page answers when it is told to. */
+/** A prediction whose skin is 2 mm to the left and whose jaw 3 mm, and whose band the page answers when the test calls `answer`. */
 async function asked(canAnswer = false) {
   const file = await openCase(sourceOf(smallCase()));
   const landmarks = new LandmarkBook(file);
@@ -51,7 +51,7 @@ test("where the page can answer, the interval holds surgery and model, too, and 
 test("they are of the stored face, with its band, whatever the plan shows meanwhile", async () => {
   const { file, plan, planned, measures, answer } = await asked();
   const before = file.surfaces[0].positions.slice();
-  // Somebody goes on planning before the band is there.
+  // The user goes on planning before the band is there.
   plan.change(0, { leftMm: 9 }, true);
   planned.displacements.fill(9);
   planned.uncertainty = new Float32Array(file.followed.length).fill(9);

@@ -38,7 +38,7 @@ TEST(CheckLoginUrl, RefusesWhereSecretsWouldBeSeen) {
 }
 
 TEST(AskProvider, SaysWhoCannotBeAskedAndNotWhat) {
-  // Port 9 of loopback: nobody listens there.
+  // Port 9 of loopback: no process listens there.
   const auto answer =
       AskProvider({.url = "http://127.0.0.1:9/?secret", .form = {{"code", "secret"}}});
   EXPECT_EQ(answer.status().code(), absl::StatusCode::kUnavailable);

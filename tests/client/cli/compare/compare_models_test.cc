@@ -50,7 +50,7 @@ TEST_F(CompareModelsTest, RegionsAreFixedEveryHandleAndFreeVertices) {
   EXPECT_EQ(regions["fixed"]["vertices"], 25);
   EXPECT_EQ(regions["handle top"]["vertices"], 25);
   EXPECT_EQ(regions["free"]["vertices"], 325 - 50);
-  // Constrained vertices are where the poses put them, whatever the model.
+  // Constrained vertices are where the poses put them, for every model.
   EXPECT_EQ(regions["fixed"]["max_mm"], 0);
   EXPECT_LT(regions["handle top"]["max_mm"], 1e-9);
   EXPECT_GT(regions["free"]["max_mm"], 0.1);

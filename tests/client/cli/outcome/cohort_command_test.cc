@@ -33,13 +33,16 @@ using ::testing::SizeIs;
 class CohortCommandTest : public CliTest {
  protected:
   // Operated heads of one plan: each moved as planned, in another place and with other stiffness.
-  void WritePatients(int count) {
+  void WritePatients(int count, double contrast = 1) {
     std::mt19937 random(4);
     const PreOperativeHead pre = BundledHead("head");
     for (int p = 1; p <= count; ++p) {
-      const PostOperativeHead post =
-          OperatedHead(pre, pre.problem.poses,
-                       {.stiffer = 1.0 + p, .position = RandomMove(&random, 5, 8)}, &random);
+      const PostOperativeHead post = OperatedHead(pre, pre.problem.poses,
+                                                  {.contrast = contrast,
+                                                   .stiffer = contrast == 1 ? 1.0 + p : 1,
+                                                   .noise_mm = contrast == 1 ? 0.1 : 0.02,
+                                                   .position = RandomMove(&random, 5, 8)},
+                                                  &random);
       ASSERT_THAT(WriteTriangleMesh(Path(absl::StrCat("skin", p, ".stl")),
                                     {.mesh = post.skin, .point_data = {}, .cell_data = {}}),
                   IsOk());
@@ -133,6 +136,44 @@ TEST_F(CohortCommandTest, ResumesAfterAKillWithoutRepeatingAPatient) {
   EXPECT_THAT(changed.out, HasSubstr("p2 runs again: its inputs changed"));
   EXPECT_EQ(TimeOf("p1"), first);
   EXPECT_GT(TimeOf("p2"), second);
+}
+
+// The patients' tissues differ twice as much as the plan says, by another model.
+TEST_F(CohortCommandTest, IsCalibratedLeavingOneOut) {
+  WritePatients(3, 2);
+  Write("list.csv", header_ + Row(1, "bsso") + Row(2, "bsso") + Row(3, "bsso"));
+  std::vector<std::string> words = Words(2);
+  words.emplace_back("--calibrate");
+  const ProcessResult run = Run(words);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+
+  EXPECT_EQ(SchemaFindings("outcome.schema.json", "cohort/cases/p1/outcome.json", {"by_settings"}),
+            "");
+  const auto patient = nlohmann::json::parse(Read("cohort/cases/p1/outcome.json"));
+  const auto& plans = patient["by_settings"][0];
+  EXPECT_EQ(plans["settings"]["stiffness_contrast"], 1);
+  EXPECT_EQ(plans["regions"].back()["mean_absolute_mm"],
+            patient["predictions"][0]["regions"].back()["predicted_to_real"]["mean_absolute_mm"]);
+  EXPECT_EQ(SchemaFindings("cohort.schema.json", "cohort/cohort.json", {"compared_by_operation"}),
+            "");
+  const auto json = nlohmann::json::parse(Read("cohort/cohort.json"));
+  ASSERT_THAT(json["calibration"], SizeIs(1));
+  const auto& calibration = json["calibration"][0];
+  EXPECT_EQ(calibration["cases"], 3);
+  EXPECT_EQ(calibration["next_patient"]["stiffness_contrast"], 2);
+  int cases = 0;
+  for (const auto& chosen : calibration["chosen"]) cases += chosen["cases"].get<int>();
+  EXPECT_EQ(cases, 3);
+  bool has_face = false;
+  for (const auto& region : calibration["regions"]) {
+    if (region["region"] != "face") continue;
+    has_face = true;
+    EXPECT_LT(region["calibrated_mean_mm"], region["plan_mean_mm"]);
+    EXPECT_EQ(region["pairs"], 3);
+  }
+  EXPECT_TRUE(has_face);
+  EXPECT_THAT(Read("cohort/cohort.html"),
+              AllOf(HasSubstr("Calibration, all operations"), HasSubstr("leave-one-out")));
 }
 
 TEST_F(CohortCommandTest, BadListsAreRefusedInOneLineBeforeAnyWork) {

@@ -150,7 +150,7 @@ TEST_F(PlanFitTest, BadTargetsAreOneLineAndNothingIsWritten) {
   EXPECT_THAT(Files(), ElementsAre("bar.vtu", "plan.json", "targets.json"));
 }
 
-// A lower jaw turned and moved; the answer of `deform` at places of the face is all that is told.
+// A lower jaw turned and moved; the fit only receives `deform`'s answer at places of the face.
 TEST_F(PlanFitTest, KnownPoseOfABundledHeadIsFoundAgain) {
   const std::string head = TestDataPath("plans/head");
   Json plan = ReadJson(head + "/plan.json");

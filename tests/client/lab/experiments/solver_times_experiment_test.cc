@@ -13,9 +13,9 @@ TEST(SolverTimesTest, FirstBarHasTheSourcesCountsAndASolveCostsLessThanItsFactor
   EXPECT_EQ(times.vertices, 2541);
   EXPECT_EQ(times.tets, 12000);
   EXPECT_EQ(times.unknowns, 2541 - 2 * 121);
-  // A factor is used again and again, and that pays: its making costs at least entries^2 / unknowns
-  // products (the squares of its columns' lengths, were all the same), three solves go over it
-  // twice for each of x, y and z.
+  // A factor is used again and again, and that pays: computing it costs at least entries^2 /
+  // unknowns products (the squares of its columns' lengths, if all were equal), three solves go
+  // over it twice for each of x, y and z.
   EXPECT_EQ(times.num_factorizations, 3);
   EXPECT_GT(times.num_solves, times.num_factorizations);
   const double entries = static_cast<double>(times.factor_bytes) / sizeof(double);

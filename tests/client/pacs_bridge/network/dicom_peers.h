@@ -14,7 +14,7 @@
 #include "core/base/process/guarded_program.h"
 #include "tests/testing/file_bytes.h"
 
-// DICOM programs that nobody here wrote, and a sink that keeps account.
+// DICOM programs of other projects, and a sink that records what it receives.
 namespace tissueform::testing {
 
 // How a program ended, and what it said on both streams.
@@ -35,7 +35,7 @@ int FreePort();
 // True once something listens there; waits up to 20 s.
 bool WaitForPort(int port);
 
-// A sink that takes all, or says what it is told to say.
+// A sink that takes all, or gives the answer that a test has set.
 class RecordingSink : public InstanceSink {
  public:
   absl::Status Keep(const ReceivedInstance& instance) override;

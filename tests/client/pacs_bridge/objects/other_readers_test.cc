@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// What is written is opened by programs that nobody here wrote.
+// What is written is opened by programs of other projects.
 
 #include <cstdio>
 #include <fstream>
@@ -42,7 +42,7 @@ class OtherReadersTest : public ObjectsFixture {
         "/usr/bin/python3 ", SourcePath("tests/client/pacs_bridge/objects/read_objects.py"), " ",
         (folder_ / "manifest.json").string(), " ", SourcePath("docs/dicom-attributes.csv")));
   }
-  // Of Debian, whatever comes first on the path.
+  // Debian's own, even if another one comes first on the path.
   bool HasModule(const std::string& module) const {
     return Run("/usr/bin/python3 -c 'import " + module + "'") == 0;
   }

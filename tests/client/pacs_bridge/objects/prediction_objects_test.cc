@@ -169,7 +169,7 @@ TEST_F(PredictionObjectsTest, SourceImagesAreReferred) {
   }
 }
 
-// Byte for byte, whatever they are written in.
+// Byte for byte, in any character set.
 struct PatientCase {
   const char* word;
   const char* character_set;

@@ -54,7 +54,7 @@ class BridgeWork : public ::testing::Test {
     UseRule(SmallRule());
   }
 
-  // Begins the intake anew.
+  // Restarts the intake with this rule.
   void UseRule(const SeriesRule& rule) {
     SeriesIntakeOptions options;
     options.rules = {rule};

@@ -228,7 +228,7 @@ TEST_F(ChosenInTwoPartsTest, APlanThatWasBuiltOfThePartIsThrownAway) {
   ReceiveRest();
   EndAssociation();
   ASSERT_EQ(StateOf(series_), SeriesState::kChosen);
-  PutPlan();  // whoever builds it did not hear of that
+  PutPlan();  // its builder has not heard of that
   PlanWork work(queue_.get(), server_.get(), {});
   EXPECT_THAT(work.Step(&series), StatusIs(absl::StatusCode::kAborted, HasSubstr("more images")));
   EXPECT_EQ(series.state, SeriesState::kChosen);

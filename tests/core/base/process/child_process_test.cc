@@ -58,7 +58,7 @@ TEST(ChildProcessTest, SignalThatEndedItIsAValue) {
   const ChildEnd end = child->Wait();
   EXPECT_EQ(end.exit_code, -1);
   EXPECT_EQ(end.signal, SIGTERM);
-  child->Signal(SIGTERM);  // nobody
+  child->Signal(SIGTERM);  // reaches no process
 }
 
 TEST(ChildProcessTest, DeadlinePassesWhileItRuns) {

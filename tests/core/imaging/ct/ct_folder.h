@@ -86,7 +86,7 @@ struct SeriesGeometry {
   Eigen::Vector3d step_mm = {0, 0, 1.25};  // from one slice to the next
 };
 
-// A patient of whom a part is air, and whose HU elsewhere grow with x, y and z by different
+// A patient with a part of air, and whose HU elsewhere grow with x, y and z by different
 // numbers; whole numbers nowhere near -1024.
 double PhantomHu(const Eigen::Vector3d& position_mm);
 

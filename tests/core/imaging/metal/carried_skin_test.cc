@@ -21,7 +21,7 @@ constexpr int kTorn = 6;  // the slice with metal
 double RadiusMm(int i, int j) { return std::hypot(i - 40, j - 40); }
 
 // A cone of tissue in air, 26 to 30 mm in radius, in voxels of 1 x 1 x 2 mm, with a piece of metal
-// in one slice, where `streak(i, j)` gives the HU, or 0 where there is none.
+// in one slice, where `streak(i, j)` gives the HU, or 0 without a streak.
 struct Head {
   CtVolume volume;
   MetalFindings findings;
@@ -70,7 +70,7 @@ TEST(CarriedSkinTest, BrightRidgesAreRemoved) {
   EXPECT_EQ(head.volume.At(60, 40, kTorn), 400);
 }
 
-// A ridge that changes the outline no more than the head does from slice to slice is none.
+// A ridge that changes the outline no more than the head does from slice to slice does not count.
 TEST(CarriedSkinTest, SkinThatIsNotTornStaysBitwise) {
   Head head([](int i, int j) { return i > 40 && i < 70 && std::abs(j - 40) < 2 ? 400 : 0; });
   const std::vector<int16_t> before = head.volume.hu;

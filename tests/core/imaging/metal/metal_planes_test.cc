@@ -31,7 +31,7 @@ struct CutJaw {
   std::vector<Plane> planes;
 };
 
-// As ResampleWithoutStreaks and what follows it do, with streaks that have been lessened before:
+// As ResampleWithoutStreaks and what follows it do, with streaks that have been reduced before:
 // that does not depend on the spacing, and takes most of the time.
 absl::StatusOr<CutJaw> CutAt(const CtVolume& volume, const MetalFindings& findings,
                              double spacing_mm) {

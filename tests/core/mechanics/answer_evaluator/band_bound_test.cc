@@ -30,7 +30,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-constexpr double kBandStepMm = 0.1;  // in which a band is told
+constexpr double kBandStepMm = 0.1;  // in which a band is encoded
 
 // The fields of the columns as they travel, for a unit of each of the 12 #handles factors.
 MatrixXd FieldsOf(const PortableAnswers& answers) {

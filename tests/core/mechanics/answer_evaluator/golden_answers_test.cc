@@ -23,7 +23,7 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
-// tests/data/prepared_answers: what ports of the evaluator are tried with. Made anew here and
+// tests/data/prepared_answers: test data for ports of the evaluator. Made again here and
 // compared; with TISSUEFORM_GOLDEN_ANSWERS=FOLDER written there.
 namespace tissueform::testing {
 namespace {

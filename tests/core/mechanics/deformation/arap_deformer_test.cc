@@ -65,7 +65,7 @@ TEST(ArapDeformerTest, IdentityGivesRestExactly) {
   EXPECT_LT(result.summary.energies_nj.back(), 1e-12);
 }
 
-// Every cross-section of a bar turns by its share, whatever way round.
+// Every cross-section of a bar turns by its share, in both directions.
 TEST(ArapDeformerTest, HalfAndWholeTwistsAreFollowed) {
   const TetMesh bar = testing::Bar({4, 4, 16}, 1.0);
   ASSERT_OK_AND_ASSIGN(const auto preparation,

@@ -18,7 +18,7 @@
 #include "tests/testing/handle_problem.h"
 #include "tests/testing/status_matchers.h"
 
-// What every model promises, whatever its mathematics.
+// What every model promises, regardless of its mathematics.
 namespace tissueform {
 namespace {
 

@@ -26,7 +26,7 @@ struct SurfaceBar {
   ConstraintSet ends;
 };
 
-// Boundary of a bar with its vertices numbered anew.
+// Boundary of a bar with its vertices renumbered.
 SurfaceBar MakeSurfaceBar() {
   const TetMesh bar = testing::Bar({3, 3, 12}, 1.0, 0.1);
   const TriangleIndices facets = BoundaryFacets(bar);

@@ -16,7 +16,7 @@ extern "C" char* openblas_get_corename();
 namespace tissueform {
 namespace {
 
-// What a child process exits with that asks for fitting kernels. The program that it starts anew,
+// The exit code of a child process that asks for fitting kernels. The program that it restarts,
 // if it does, is this one with the given arguments.
 int ExitCodeOfAsking(const char* chosen_kernels) {
   const pid_t child = fork();
@@ -45,7 +45,7 @@ bool NeedsOthers() {
 
 TEST(BlasThreadsTest, ProgramStartsAnewOnlyWhereItsKernelsDoNotFit) {
   if (std::getenv("OPENBLAS_CORETYPE") != nullptr) {
-    EXPECT_FALSE(NeedsOthers());  // this is the program that was started anew
+    EXPECT_FALSE(NeedsOthers());  // this is the program that was restarted
     return;
   }
   EXPECT_EQ(ExitCodeOfAsking(nullptr), NeedsOthers() ? 0 : 7);

@@ -76,7 +76,7 @@ TEST_F(FitProblemTest, RasRequestIsTheSameAsItsLpsTwin) {
   EXPECT_EQ(ras.unknowns[0].sign, -1);
 }
 
-// Turned and scaled about the origin, which is no pivot that anybody has chosen.
+// Turned and scaled about the origin, which is not the pivot that the fit chooses.
 TEST_F(FitProblemTest, PoseAboutAnotherPivotIsTheSameMovement) {
   HandlePose pose{.rotation_vector = {0.1, -0.2, 0.3}, .translation_mm = {1, 2, 3}, .scale = 1.1};
   ASSERT_OK_AND_ASSIGN(const FitProblem problem,

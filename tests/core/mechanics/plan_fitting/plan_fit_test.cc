@@ -188,7 +188,7 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair("NeoHookean", DeformationModel::kNeoHookean)),
     [](const auto& test) { return test.param.first; });
 
-// As somebody pulls: every wish a little further than the one before, which cannot be met.
+// As a user pulls: each target, which cannot be reached, a little further than the one before.
 TEST_P(KnownPoseTest, APullEndsWhereASearchFromRestDoes) {
   Case bar(testing::Bar({4, 4, 8}, 2.0, 0.2), 2, GetParam().second);
   FitRequest request = bar.TargetsOf(std::vector<HandlePose>(2), 6);

@@ -78,7 +78,7 @@ TEST(ColumnCompressionTest, KeepsAsManyColumnsAsTheToleranceNeeds) {
   EXPECT_EQ(before, 7) << "that is their rank";
 }
 
-// Also of uses that nobody has tried, far beyond those that the columns were turned for.
+// Also of uses that were never tried, far beyond those that the columns were turned for.
 TEST(ColumnCompressionTest, BoundHoldsForEveryUse) {
   for (const int factors : {1, 3}) {
     const Eigen::MatrixXd columns = FallingColumns(15, 9);

@@ -25,7 +25,7 @@ using testing::RandomPoses;
 using testing::StatusIs;
 
 using ::tissueform::testing::kInvalid;
-// So small that no bound keeps it: whatever there is of the columns is read.
+// So small that no bound keeps it: all digits of the columns are read.
 constexpr double kAllDigitsMm = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
 

@@ -256,7 +256,7 @@ TEST(MaterialExpansionTest, ConstrainedVerticesAreCertain) {
   }
 }
 
-// Pressed to a third of its length a bar is about to buckle: no band is told there.
+// Pressed to a third of its length a bar is about to buckle: no band is given there.
 TEST(MaterialExpansionTest, WhereTheAnswerIsNotStableThereIsNoExpansion) {
   const UncertainBar bar(DeformationModel::kNeoHookean);
   Positions pressed = bar.mesh.positions();

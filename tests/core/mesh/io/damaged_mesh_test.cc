@@ -51,7 +51,7 @@ class DamagedMeshTest : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  // Reads `contents` as a mesh; nothing may appear on stderr, whatever comes of it.
+  // Reads `contents` as a mesh; nothing may appear on stderr, regardless of the result.
   absl::StatusOr<TetMeshFile> Read(const std::string& contents) {
     const std::string path = (folder_ / "mesh.vtu").string();
     std::ofstream(path, std::ios::binary) << contents;

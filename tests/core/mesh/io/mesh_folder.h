@@ -35,8 +35,8 @@ class MeshFolder : public ::testing::Test {
     std::ofstream(Path(name), std::ios::binary) << contents;
   }
 
-  // Writes a file and reads it as a mesh of tets; nothing may appear on stderr, whatever comes of
-  // it.
+  // Writes a file and reads it as a mesh of tets; nothing may appear on stderr, regardless of the
+  // result.
   absl::StatusOr<TetMeshFile> Read(const std::string& name, const std::string& contents) const {
     Write(name, contents);
     ::testing::internal::CaptureStderr();

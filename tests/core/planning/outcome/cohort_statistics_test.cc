@@ -3,6 +3,7 @@
 
 #include "core/planning/outcome/cohort_statistics.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -13,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
+#include <Eigen/Core>
 #include <sys/wait.h>
 
 #include "tests/testing/test_paths.h"
@@ -117,6 +119,69 @@ TEST(CohortStatisticsTest, LimitsOfAgreementAreRoundTheBias) {
   EXPECT_DOUBLE_EQ(agreement.sd, 1);
   EXPECT_NEAR(agreement.low, 0.04, 1e-12);
   EXPECT_NEAR(agreement.high, 3.96, 1e-12);
+}
+
+Eigen::MatrixXd RandomErrors(std::mt19937* random, Eigen::Index patients, Eigen::Index settings) {
+  std::uniform_real_distribution<double> error(0.2, 1.5);
+  return Eigen::MatrixXd::NullaryExpr(patients, settings, [&] { return error(*random); });
+}
+
+TEST(CalibrationTest, EachPatientGetsTheSettingWithTheSmallestMeanOfTheOthers) {
+  std::mt19937 random(11);
+  const Eigen::MatrixXd errors = RandomErrors(&random, 9, 7);
+  const std::vector<Eigen::Index> chosen = BestSettingsOfOthers(errors);
+  ASSERT_EQ(chosen.size(), 9U);
+  for (Eigen::Index patient = 0; patient < 9; ++patient) {
+    double least = 1e9;
+    Eigen::Index best = -1;
+    for (Eigen::Index setting = 0; setting < 7; ++setting) {
+      double sum = 0;
+      for (Eigen::Index other = 0; other < 9; ++other) {
+        if (other != patient) sum += errors(other, setting);
+      }
+      if (sum / 8 < least) best = setting;
+      least = std::min(least, sum / 8);
+    }
+    EXPECT_EQ(chosen[static_cast<size_t>(patient)], best) << "patient " << patient;
+  }
+}
+
+TEST(CalibrationTest, APatientsOwnErrorDoesNotCount) {
+  std::mt19937 random(12);
+  const Eigen::MatrixXd errors = RandomErrors(&random, 6, 5);
+  const std::vector<Eigen::Index> chosen = BestSettingsOfOthers(errors);
+  for (Eigen::Index patient = 0; patient < 6; ++patient) {
+    for (Eigen::Index setting = 0; setting < 5; ++setting) {
+      Eigen::MatrixXd changed = errors;
+      changed(patient, setting) = -100;
+      const auto at = static_cast<size_t>(patient);
+      EXPECT_EQ(BestSettingsOfOthers(changed)[at], chosen[at]);
+    }
+  }
+}
+
+// Settings that do not matter: what is fitted to all patients looks better than it is, what is
+// cross-validated does not.
+TEST(CalibrationTest, NoiseIsNotReportedAsAGain) {
+  std::mt19937 random(13);
+  double fitted = 0;
+  double validated = 0;
+  constexpr int kCohorts = 400;
+  constexpr Eigen::Index kPatients = 12;
+  for (int c = 0; c < kCohorts; ++c) {
+    const Eigen::MatrixXd errors = RandomErrors(&random, kPatients, 20);
+    const std::vector<Eigen::Index> chosen = BestSettingsOfOthers(errors);
+    fitted += errors.col(BestSetting(errors)).mean() / kCohorts;
+    for (Eigen::Index p = 0; p < kPatients; ++p) {
+      validated += errors(p, chosen[static_cast<size_t>(p)]) / kPatients / kCohorts;
+    }
+  }
+  EXPECT_NEAR(validated, 0.85, 0.02);
+  EXPECT_LT(fitted, 0.70);
+}
+
+TEST(CalibrationTest, EqualSettingsLeaveThePlans) {
+  EXPECT_EQ(BestSetting(Eigen::MatrixXd::Constant(4, 3, 0.5)), 0);
 }
 
 }  // namespace

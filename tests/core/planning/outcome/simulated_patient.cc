@@ -15,6 +15,7 @@
 #include "core/planning/case_file/predicted_case.h"
 #include "core/planning/case_file/skin_follow.h"
 #include "core/planning/case_file/viewer_file.h"
+#include "core/planning/outcome/model_settings.h"
 #include "core/planning/plan_io.h"
 #include "tests/testing/meshes.h"
 
@@ -65,7 +66,7 @@ TriangleMesh Rescanned(const TriangleMesh& mesh, const Simulation& simulation,
 
 Positions Operated(const PlanProblem& problem, const std::vector<HandlePose>& poses,
                    const Simulation& simulation) {
-  Eigen::VectorXd stiffness = problem.stiffness;
+  Eigen::VectorXd stiffness = WithContrast(problem.stiffness, simulation.contrast);
   const double middle = problem.mesh->positions().col(2).mean();
   for (Eigen::Index t = 0; t < stiffness.size(); ++t) {
     if (problem.mesh->positions()(problem.mesh->tets()(t, 0), 2) > middle) {

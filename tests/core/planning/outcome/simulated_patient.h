@@ -30,6 +30,7 @@ RigidMove RandomMove(std::mt19937* random, double most_deg, double most_mm);
 // How an operated head is made.
 struct Simulation {
   DeformationModel model = DeformationModel::kNeoHookean;
+  double contrast = 1;      // ModelSettings::stiffness_contrast
   double stiffer = 1;       // times the plan's stiffness, in the upper half of the mesh
   double noise_mm = 0.1;    // standard deviation of each coordinate
   RigidMove position = {};  // of the whole head afterwards

@@ -84,7 +84,7 @@ TEST(ConeBeamPlanTest, PredictsTheFaceOfTheWholeCt) {
   EXPECT_EQ(build.values.field->outside_value, 0);
   EXPECT_EQ(build.head.options.bone_above_hu, build.values.bone_above_hu);
   EXPECT_GT(build.coverage.cuts.size(), 1U);
-  // One tissue, whatever the gray values are.
+  // One tissue, regardless of the gray values.
   EXPECT_EQ(std::set<int32_t>(build.stiffness.tissue.begin(), build.stiffness.tissue.end()).size(),
             1U);
 }

@@ -3,7 +3,7 @@
 
 // Draws the picture of docs/ct-input.md: tissueform-metal-pictures OUT.png. Slices of the bundled
 // head, from above to below without metal, as the simulated scanner shows metal, and with its
-// streaks lessened; two with fillings and two with braces.
+// streaks reduced; two with fillings and two with braces.
 
 #include <algorithm>
 #include <array>

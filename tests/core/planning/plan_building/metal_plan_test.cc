@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// What metal does to a plan when its streaks are lessened: the bundled head as a scanner shows it
+// What metal does to a plan when its streaks are reduced: the bundled head as a scanner shows it
 // without metal, with fillings and with braces (tests/testing/metal_phantom.h). The tests share one
 // build each, so the whole program is one test of ctest.
 
@@ -123,8 +123,8 @@ TEST_F(MetalPlanTest, WithFillingsCorrectedThePlanIsAsWithoutMetal) {
 
 TEST_F(MetalPlanTest, WithBracesCorrectedThePlanIsAsWithoutMetal) {
   ExpectAsWithoutMetal(shared_build->braces);
-  // The brackets count as their teeth, and the nearest has 3.2 mm of lip over it; that leaves its
-  // blur to be told from it, which is finer than a voxel.
+  // The brackets count as their teeth, and the nearest has 3.2 mm of lip over it; the tolerance
+  // allows for its blur, which is finer than a voxel.
   EXPECT_GE(shared_build->braces.nearest_bone.mm, kNearSkinMm - 0.5);
 }
 

@@ -142,7 +142,7 @@ TEST_F(SurfacesPlanTest, PhantomBecomesAPlanWhoseSkinFollowsTheJaw) {
   EXPECT_LT(MeanBackward(*build, moved, SkinRegion::kNose), 0.5);
 }
 
-// A file of that folder, without what may name a CT: notes, which say that there was none.
+// A file of that folder, without what may name a CT: notes, which say that no CT was given.
 std::string WithoutNotes(const std::string& path, const PlanBuild& build) {
   std::string text = BytesOfFile(path);
   for (const std::string& note : build.ct.notes) {

@@ -180,7 +180,7 @@ TEST_F(FigureTest, OwnDisplayIsUsableAndGoneAfterwards) {
   EXPECT_FALSE(DisplayOpens());
 }
 
-// A connection to the X display of that name; -1 when there is none.
+// A connection to the X display of that name; -1 without one.
 int ConnectTo(const std::string& display) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

@@ -83,7 +83,7 @@ INSTANTIATE_TEST_SUITE_P(
                       BadList{"PrincipalsAsList", R"({"principals": ["a"]})", "unknown member"}),
     [](const auto& test) { return std::string(test.param.name); });
 
-// n - s in place of s signs the same, and whoever has the token can write it so.
+// n - s in place of s signs the same, and any holder of the token can write it so.
 std::string WithOtherSignature(const std::string& token) {
   const std::vector<std::string> parts = absl::StrSplit(token, '.');
   std::string bytes;

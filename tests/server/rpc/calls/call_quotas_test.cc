@@ -88,7 +88,7 @@ TEST_F(CallQuotasTest, WhoHasGoneIsForgottenButNotWhoHasACallOpen) {
   EXPECT_EQ(quotas_.open_streams("here"), 1);
 }
 
-// Everybody is "a".
+// Every caller is "a".
 class OnePrincipal : public Authenticator {
  public:
   absl::StatusOr<Authenticated> Authenticate(const Credentials& /*credentials*/) override {

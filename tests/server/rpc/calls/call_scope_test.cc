@@ -104,7 +104,7 @@ TEST(CallScopeTest, AStreamGoesOnWithATokenOfTheSamePrincipalOnly) {
   EXPECT_TRUE(open.principal().anonymous());
 }
 
-// Writes down what it is told.
+// Writes down what it observes.
 class Notes : public CallObserver {
  public:
   absl::Status OnBegin(const ObservedCall& call) override {

@@ -23,7 +23,7 @@
 namespace tissueform::testing {
 namespace {
 
-// Is told by the scope of every call from where it comes.
+// Records the address from which each call comes.
 class AddressNote final : public CallObserver {
  public:
   absl::Status OnBegin(const ObservedCall& call) override {

@@ -103,7 +103,7 @@ class MessageStreamTest : public ::testing::Test {
     };
   }
 
-  // No call is open any longer.
+  // No call is open.
   bool Idle() { return gate_.WaitUntilIdle(std::chrono::steady_clock::now()); }
 
   AdmissionControl gate_;

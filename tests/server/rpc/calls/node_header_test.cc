@@ -33,7 +33,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// Lets nobody in, and counts who knocks.
+// Refuses every caller, and counts them.
 class NobodyComesIn final : public Authenticator {
  public:
   absl::StatusOr<Authenticated> Authenticate(const Credentials& /*credentials*/) override {

@@ -47,7 +47,7 @@ class ChangeListenerTest : public ::testing::Test {
   }
   void TearDown() override { listener_.reset(); }
 
-  // All that has been told when this is.
+  // All changes that have been reported once this one is.
   std::vector<StoreChange> SeenUntil(const StoreChange& last) {
     MutexLock lock(mutex_);
     while (std::find(seen_.begin(), seen_.end(), last) == seen_.end()) changed_.Wait(mutex_);

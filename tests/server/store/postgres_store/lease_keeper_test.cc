@@ -233,7 +233,7 @@ TEST_F(LeaseKeeperTest, AThreadRenewsUntilTheEnd) {
   EXPECT_GE(counted.renewals, 3);
 }
 
-// Whatever two servers do in whatever order: see each assertion.
+// Holds for all actions of two servers in any order: see each assertion.
 void CheckRules(LeaseServers& servers, const LeaseSteps& steps) {
   ASSERT_FALSE(servers.MayAnswer(0) && servers.MayAnswer(1)) << ToString(steps);
   std::map<int64_t, int> writers;
@@ -257,7 +257,7 @@ void CheckAllOrders(const LeaseSteps& all, size_t depth, LeaseSteps* steps) {
     }
   }
   ASSERT_NO_FATAL_FAILURE(CheckRules(servers, *steps));
-  // What nobody did changes nothing: the order without it goes on from here.
+  // A step that did nothing changes nothing: the order without it goes on from here.
   const bool is_nothing = absl::StrContains(seen, ": may not") ||
                           absl::StrContains(seen, ": has none") ||
                           absl::StrContains(seen, ": is there");

@@ -32,13 +32,13 @@ enum class LeaseAction {
   kCommit,     // as a server does that may answer
   kCommitOld,  // as one that was stopped goes on with, under the epoch that it had last
   kDelete,     // as a server does that may answer
-  kMakeAgain,  // under the same id, where it was deleted: whoever is asked to
+  kMakeAgain,  // under the same id, where it was deleted: by either server
   kWait,
 };
 
 struct LeaseStep {
   LeaseAction action = LeaseAction::kWait;
-  int server = 0;  // 0 or 1; for kWait and kMakeAgain nobody's
+  int server = 0;  // 0 or 1; not used for kWait and kMakeAgain
 };
 using LeaseSteps = std::vector<LeaseStep>;
 

@@ -32,7 +32,7 @@ struct ModelStore {
     const auto found = sessions.find(session);
     return found != sessions.end() && epoch >= found->second.epoch;
   }
-  // Greater than every one before, of whatever session.
+  // Greater than every one before, of any session.
   int64_t NextEpoch() { return ++newest_epoch; }
 
   std::chrono::steady_clock::time_point now{std::chrono::hours(1)};

@@ -62,7 +62,7 @@ class PostgresStoresTest : public ::testing::Test {
     return record.sha256;
   }
 
-  // A database of its own, made anew, that an administrator may take away.
+  // A database of its own, made again, that an administrator may take away.
   static void MakeAway() {
     RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
     RunOutsideTransaction("CREATE DATABASE away");

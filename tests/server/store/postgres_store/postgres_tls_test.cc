@@ -64,7 +64,7 @@ class PostgresTlsTest : public ::testing::Test {
                      "/postgres?sslmode=verify-full&sslrootcert=", (folder_ / roots).string());
     return PostgresStores::Open({.database = options}).status();
   }
-  // The database takes its new settings a moment after it was told to.
+  // The database takes its new settings a moment after it was asked to.
   absl::Status OpenWhenTaken() {
     absl::Status status;
     for (int i = 0; i < 3'000; ++i) {

@@ -11,7 +11,7 @@
 #include "server/store/postgres_store/postgres_stores.h"
 
 // The PostgreSQL server that this test program was started with (pg_virtualenv sets PGHOST, PGPORT,
-// PGUSER and PGPASSWORD). Tests that need one are skipped where there is none.
+// PGUSER and PGPASSWORD). Tests that need a server are skipped without it.
 namespace tissueform::testing {
 
 bool HasTestDatabase();

@@ -1,0 +1,35 @@
+// Copyright 2026 The Tissueform Authors.
+// SPDX-License-Identifier: AGPL-3.0-or-later
+
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nlohmann/json.hpp"
+
+#include "client/cli/outcome/cohort_results.h"
+
+namespace tissueform {
+
+// What the tables of cohort.json have in common.
+
+// To thousandths of a millimeter, as outcome.json has distances.
+double Rounded(double value);
+
+// All together first, then each operation; only together where there is one.
+std::vector<std::string> OperationsOf(const CohortResults& results);
+
+// Whether a case with this operation belongs to a group of OperationsOf.
+bool IsOf(const std::string& operation, const std::string& group);
+
+// Wilcoxon's signed rank test of paired differences in mm, and their mean and median.
+nlohmann::ordered_json PairJson(const std::vector<double>& differences);
+
+// The leave-one-out calibration of each operation and movement with at least kLeastCalibrated
+// cases; only settings that every case was predicted with. Empty without --calibrate.
+nlohmann::ordered_json CalibrationJson(const CohortResults& results);
+
+inline constexpr size_t kLeastCalibrated = 3;
+
+}  // namespace tissueform
