@@ -88,7 +88,7 @@ absl::Status AddCase(const CohortCase& row, const Json& outcome, CohortResults* 
       AddLandmarks(group, prediction.at("landmarks"), results);
     }
     AddDeviations(row, outcome.at("segments"), results);
-    AddSettings(row, outcome.value("by_settings", Json::array()), results);
+    AddSettings(row, outcome.at("by_settings"), results);
     return absl::OkStatus();
   } catch (const Json::exception&) {
     return absl::DataLossError(

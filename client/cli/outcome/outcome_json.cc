@@ -140,7 +140,7 @@ Json OutcomeJson(const Outcome& outcome, const HeadFrame& frame) {
   json["mouth_opening_deg"] =
       outcome.opening ? Json(Rounded(outcome.opening->degrees)) : Json(nullptr);
   json["predictions"] = PredictionsJson(outcome);
-  if (!outcome.by_settings.empty()) json["by_settings"] = BySettingsJson(outcome);
+  json["by_settings"] = BySettingsJson(outcome);
   json["by_published_ratios"] = LandmarksJson(outcome.by_ratios);
   json["excess_ml"] = Rounded(outcome.excess_ml);
   json["cautions"] = outcome.cautions;
