@@ -40,7 +40,8 @@ Eigen::Index PlaceOf(const std::vector<Value>& values, const Value& value) {
 std::vector<std::string> CommonSettings(
     const std::map<std::string, std::vector<std::string>>& of_case) {
   std::vector<std::string> common = of_case.begin()->second;
-  for (const auto& [id, settings] : of_case) {
+  for (const auto& entry : of_case) {
+    const std::vector<std::string>& settings = entry.second;
     std::erase_if(common, [&settings](const std::string& candidate) {
       return std::ranges::find(settings, candidate) == settings.end();
     });

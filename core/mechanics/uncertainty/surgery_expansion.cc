@@ -42,6 +42,11 @@ HandlePose Missed(const HandlePose& pose, const Eigen::Vector3d& place, const Ei
   return PoseOf(Composed(miss, MoveOf(pose)), pose.pivot_mm);
 }
 
+// A segment that the plan leaves in place is taken as not operated on.
+bool IsOperated(const HandlePose& pose) {
+  return !pose.rotation_vector.isZero(0) || !pose.translation_mm.isZero(0) || pose.scale != 1;
+}
+
 // What a change of the poses' coefficients does while the rows that press stay closed.
 class Responder {
  public:
@@ -91,6 +96,7 @@ absl::StatusOr<AnswerExpansion> ExpandSurgery(MeshPreparation* preparation,
                             HeldRows(constraints, rest, poses, deformed, false));
   AnswerExpansion expansion;
   for (size_t h = 0; h < poses.size(); ++h) {
+    if (!IsOperated(poses[h])) continue;
     const Eigen::Vector3d front = MovedFront(constraints.handles()[h], rest, axes.col(1), poses[h]);
     for (int v = 0; v < kVariablesPerHandle; ++v) {
       const int axis = v % 3;

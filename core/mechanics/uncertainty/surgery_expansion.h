@@ -28,11 +28,11 @@ struct SurgeryDeviation {
   Eigen::Vector3d rotation_deg = {1.17, 1.17, 1.17};
 };
 
-// How the answer at `poses` changes when segments are placed elsewhere: six variables a handle,
-// three of translation and three of rotation, in first order and by the responses of linear
-// elasticity at rest, regardless of the model that gave the answer. `axes` has the patient's left,
-// back and top in its columns, in LPS. With contact the rows that hold `deformed` (#V by 3) stay
-// closed, and no others close.
+// How the answer at `poses` changes when segments are placed elsewhere: six variables a handle that
+// the poses move, three of translation and three of rotation, in first order and by the responses
+// of linear elasticity at rest, regardless of the model that gave the answer. `axes` has the
+// patient's left, back and top in its columns, in LPS. With contact the rows that hold `deformed`
+// (#V by 3) stay closed, and no others close.
 //
 // Errors: those of MeshPreparation::Elastic and Contact.
 absl::StatusOr<AnswerExpansion> ExpandSurgery(MeshPreparation* preparation,

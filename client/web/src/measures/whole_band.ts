@@ -113,6 +113,7 @@ export async function wholeBands(face: ShownFace, answers: PlanAnswers): Promise
   }));
 }
 
+/** A segment that the plan leaves in place is taken as not operated on. */
 function isAtRest({ rotationVector, translationMm, scale }: Pose): boolean {
   return norm(rotationVector) === 0 && norm(translationMm) === 0 && scale === 1;
 }
@@ -138,9 +139,10 @@ export function placeOf(face: ShownFace, anchor: Anchor, isLip: boolean): Place 
   };
 }
 
-/** Each with one segment a part of a standard deviation beside its pose, in one of six ways. */
+/** Each with one moved segment a part of a standard deviation off its pose, in one of six ways. */
 function* missedPoses(file: CaseFile, handles: PlanAnswers["handles"], planned: readonly Pose[]): Generator<Pose[]> {
   for (const [index, { name }] of handles.entries()) {
+    if (isAtRest(planned[index])) continue;
     const front = movedPoint(planned[index], frontOf(file, name));
     for (const axis of [0, 1, 2]) {
       const along = [0, 0, 0].map((_, k) => (k === axis ? 1 : 0)) as Vector;

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { expect, test } from "vitest";
+import type { Pose } from "../../src/geometry/pose";
 import { landmarkMovements } from "../../src/measures/face_measures";
 import { movementBands } from "../../src/measures/movement_bands";
-import { DEVIATIONS, wholeBands } from "../../src/measures/whole_band";
+import { DEVIATIONS, type PlanAnswers, wholeBands } from "../../src/measures/whole_band";
 import { faceThatFollows } from "../testing/following_face";
 
 const Z95 = 1.96;
@@ -56,6 +57,23 @@ test("what neither the plan nor its deviations move has no band", async () => {
   const { landmarks } = shown.file.manifest;
   const bands = await movementBands(shown, answers);
   expect(bands?.map((band) => band !== null)).toEqual(landmarks.map(({ handle }) => handle === "mandible"));
+});
+
+test("a segment that the plan leaves in place is not missed", async () => {
+  const { shown, answers } = await faceThatFollows(0.7, null);
+  let asked = 0;
+  const resting = { rotationVector: [0, 0, 0], pivotMm: [5, 5, 5], translationMm: [0, 0, 0], scale: 1 } satisfies Pose;
+  const both: PlanAnswers = {
+    handles: [...answers.handles, { name: "maxilla" }],
+    poses: () => [...answers.poses(), resting],
+    skinAt: async (poses) => {
+      asked += 1;
+      expect(poses[1]).toEqual(resting);
+      return answers.skinAt(poses.slice(0, 1));
+    },
+  };
+  expect(await movementBands(shown, both)).toEqual(await movementBands(shown, answers));
+  expect(asked).toBe(7);
 });
 
 test("a plan that moves nothing has no band, and none is known where the page cannot answer", async () => {

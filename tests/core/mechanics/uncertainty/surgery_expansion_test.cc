@@ -123,6 +123,15 @@ TEST_F(SurgeryExpansionTest, ItTurnsAboutTheFrontOfTheSegment) {
   }
 }
 
+TEST_F(SurgeryExpansionTest, ASegmentThatStaysInPlaceIsNotMissed) {
+  const std::vector<HandlePose> rest(1);
+  ASSERT_OK_AND_ASSIGN(const AnswerExpansion expansion,
+                       ExpandSurgery(bar_.Prepare().get(), rest, bar_.mesh.positions(),
+                                     Eigen::Matrix3d::Identity(), {}));
+  EXPECT_EQ(expansion.variables, 0);
+  EXPECT_TRUE(expansion.terms.empty());
+}
+
 TEST(SurgeryOfLipsTest, WithContactItEqualsDifferencesThatPressInTheSameRows) {
   const PartedBlock block;
   const ConstraintSet constraints = block.Constraints();
