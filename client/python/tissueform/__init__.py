@@ -34,6 +34,7 @@ from .errors import (AccessDenied, Cancelled, Conflict, DataDamaged, DeadlineExc
 from .fitting import Fit, FitTarget, FittedTarget, Freedom  # noqa: E402
 from .local import LocalServer, local  # noqa: E402
 from .meshes import Mesh, boundary_triangles  # noqa: E402
+from .outcomes import outcome, outcome_cohort  # noqa: E402
 from .plan_builds import BuiltPlan  # noqa: E402
 from .plans import Plan, read_plan  # noqa: E402
 from .poses import Pose, ras_to_lps  # noqa: E402
@@ -49,5 +50,6 @@ __all__ = [
     "DoctorLine", "Drag", "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded",
     "LocalServer", "MaterialRanges", "Measure", "Mesh", "NotFound", "Plan", "Pose", "Prediction", "Prepared", "PreparedAnswers",
     "ServerError", "ServerInfo", "ServerUnavailable", "Session", "StoredPrediction", "Tls", "TissueformError", "Unauthenticated", "Volume",
-    "boundary_triangles", "connect", "doctor", "from_meshio", "local", "ras_to_lps", "read_plan", "sample_bar", "to_meshio", "to_pyvista",
+    "boundary_triangles", "connect", "doctor", "from_meshio", "local", "outcome", "outcome_cohort", "ras_to_lps", "read_plan", "sample_bar",
+    "to_meshio", "to_pyvista",
 ]

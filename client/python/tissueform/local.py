@@ -8,27 +8,18 @@ import collections
 import os
 import pathlib
 import select
-import shutil
 import subprocess
 import threading
 import time
 from typing import Any, Deque, Mapping, Optional, Sequence
 
 from ._channel import PathLike
+from ._programs import find_program
 from .client import Client, connect
 from .errors import NotFound, ServerUnavailable
 
 _GRACE_MS = 30_000
 _KEPT_LINES = 50
-
-
-def _find_server(program: Optional[PathLike]) -> pathlib.Path:
-    wanted = os.fspath(program) if program is not None else os.environ.get("TISSUEFORM_SERVER_PROGRAM", "tissueform-server")
-    found = shutil.which(wanted)
-    if found is None:
-        raise NotFound(f"there is no program {wanted}",
-                       advice="install the package tissueform-server, set TISSUEFORM_SERVER_PROGRAM, or give program=PATH")
-    return pathlib.Path(found).resolve()
 
 
 def _find_guard(server: pathlib.Path) -> pathlib.Path:
@@ -107,7 +98,7 @@ def local(program: Optional[PathLike] = None, *, options: Sequence[str] = (), ti
 
     Errors: NotFound (no such program), ServerUnavailable (it did not start; the message has its last line).
     """
-    binary = _find_server(program)
+    binary = find_program("tissueform-server", program)
     command = [str(_find_guard(binary)), str(_GRACE_MS), "0", "0", "0", str(binary), "--host", "127.0.0.1", "--port", "0", "--in-memory", *options]
     # The guard ends the server when this pipe closes, so also when this process is killed.
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
