@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "client/cli/outcome/cohort_tables.h"
+#include "client/cli/outcome/outcome_json.h"
 #include "core/planning/outcome/cohort_statistics.h"
 
 namespace tissueform {
@@ -31,9 +32,9 @@ struct ErrorTable {
   std::map<std::string, Eigen::MatrixXd> regions;  // #cases by #settings, mm; NaN: not compared
 };
 
-template <typename Value>
-Eigen::Index PlaceOf(const std::vector<Value>& values, const Value& value) {
-  return std::ranges::find(values, value) - values.begin();
+// As many as names where it is none of them.
+Eigen::Index PlaceOf(const std::vector<std::string>& names, const std::string& name) {
+  return std::ranges::find(names, name) - names.begin();
 }
 
 // Settings of all cases, in the first case's order.

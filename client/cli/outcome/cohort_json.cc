@@ -13,6 +13,7 @@
 
 #include "client/cli/outcome/cohort_results.h"
 #include "client/cli/outcome/cohort_tables.h"
+#include "client/cli/outcome/outcome_json.h"
 #include "core/base/software_version.h"
 #include "core/planning/outcome/cohort_statistics.h"
 
@@ -234,8 +235,6 @@ Json RefusedJson(const CohortResults& results) {
 }
 
 }  // namespace
-
-double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
 std::vector<std::string> OperationsOf(const CohortResults& results) {
   std::map<std::string, int> counts;

@@ -14,9 +14,6 @@ namespace tissueform {
 
 // What the tables of cohort.json have in common.
 
-// To thousandths of a millimeter, as outcome.json has distances.
-double Rounded(double value);
-
 // All together first, then each operation; only together where there is one.
 std::vector<std::string> OperationsOf(const CohortResults& results);
 

@@ -13,9 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Thousandths: what is beyond is noise, and files stay readable.
-double Rounded(double value) { return std::round(value * 1000) / 1000; }
-
 Json StatisticsJson(const DistanceStatistics& found) {
   return {{"area_cm2", Rounded(found.area_cm2)},
           {"mean_mm", Rounded(found.mean_mm)},
@@ -123,6 +120,8 @@ Json BySettingsJson(const Outcome& outcome) {
 }
 
 }  // namespace
+
+double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
 Json OutcomeJson(const Outcome& outcome, const HeadFrame& frame) {
   const RigidMove& move = outcome.registration.to_pre;

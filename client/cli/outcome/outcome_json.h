@@ -17,4 +17,7 @@ nlohmann::ordered_json OutcomeJson(const Outcome& outcome, const HeadFrame& fram
 std::string OutcomeHtml(const nlohmann::ordered_json& outcome,
                         const std::vector<std::string>& pictures);
 
+// To thousandths, as these files have numbers: what is beyond is noise, and files stay readable.
+double Rounded(double value);
+
 }  // namespace tissueform
