@@ -32,7 +32,7 @@ struct ErrorTable {
   std::map<std::string, Eigen::MatrixXd> regions;  // #cases by #settings, mm; NaN: not compared
 };
 
-// As many as names where it is none of them.
+// The number of names where it is not among them.
 Eigen::Index PlaceOf(const std::vector<std::string>& names, const std::string& name) {
   return std::ranges::find(names, name) - names.begin();
 }
