@@ -90,7 +90,7 @@ test("measures, a target, the band and the bite", async () => {
   const { page } = await openCase(await planner.browse(), planner);
   const open = (title: string) => page.locator("summary").getByText(title, { exact: true }).click();
   const toTop = (title: string) =>
-    page.locator(`aside > details[aria-label="${title}"]`).evaluate((part) => {
+    page.locator(`aside > [aria-label="${title}"]`).evaluate((part) => {
       const panel = part.closest("aside") as HTMLElement;
       panel.scrollTop += part.getBoundingClientRect().top - panel.getBoundingClientRect().top;
     });
@@ -114,6 +114,9 @@ test("measures, a target, the band and the bite", async () => {
 
   await page.getByText("Linear elastic", { exact: true }).click();
   await page.locator("[data-measure=e_line_lower_lip] .band").waitFor();
+  await page.locator(".movements").getByText(/, material \d/).first().waitFor();
+  await toTop("Movements");
+  await picture(page, "movements");
   await page.getByLabel("Color by").selectOption({ label: "95 % interval (material)" });
   await page.locator(".legend").waitFor({ state: "visible" });
   await page.getByRole("button", { name: "3/4" }).click();
