@@ -87,6 +87,7 @@ absl::Status NeedsMoreMemory(absl::string_view what, const IsolationLimits& limi
 // Libraries with threads of their own turn bad_alloc into errors of theirs. If a process gives up
 // after using most of its memory limit, lack of memory is taken as the cause.
 bool HasTakenMost(const IsolationLimits& limits) {
+  if (!kLimitsMemory) return false;
   constexpr int64_t kBytesPerKibibyte = 1024;
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {

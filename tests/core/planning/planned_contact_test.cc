@@ -198,7 +198,7 @@ TEST(PlannedContactTest, BadRowsAreNamed) {
       }
     }
     Json plan = PlanOfBlock(PartedBlock().rows);
-    plan["contact"]["rows"] = {row};
+    plan["contact"]["rows"] = Json::array({row});
     return Resolve(plan);
   };
   EXPECT_THAT(with(Json::object()), IsOk());
