@@ -40,6 +40,9 @@ constexpr char kRecipe[] = R"({"format": "tissueform-recipe", "version": 1,
   "segments": [{"name": "mandible", "osteotomy": "bssro",
                 "pose": {"translation_mm": [0, -4, 0]}}]})";
 
+// Sanitizers make a build some ten times as long.
+constexpr auto kMostOfABuild = std::chrono::minutes(10);
+
 // The bundled CT in one file, as a client would send it.
 std::string OneFileOfTheCt() {
   std::string file;
@@ -106,6 +109,7 @@ class PlanBuildsOfServerTest : public ServiceTest {
   // All states that a watch tells, the last of which is the end.
   std::vector<v1::PlanBuild> Watch(const std::string& name) {
     const auto context = ContextOf(ann_);
+    context->set_deadline(std::chrono::system_clock::now() + kMostOfABuild);
     v1::WatchPlanBuildRequest request;
     request.set_name(name);
     const auto reader = stub_->WatchPlanBuild(context.get(), request);
@@ -307,9 +311,11 @@ TEST_F(PlanBuildsOfServerTest, ACancelledBuildEndsItsProgram) {
 
 TEST_F(PlanBuildsOfServerTest, AFailureIsOneSentenceWithoutAPathOfTheServer) {
   Start({.max_memory_bytes = int64_t{150} << 20});
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which need terabytes of addresses
   const v1::PlanBuild without_memory = Watch(Create().name()).back();
   EXPECT_EQ(without_memory.state(), v1::PLAN_BUILD_STATE_FAILED);
   EXPECT_THAT(without_memory.detail(), HasSubstr("bytes of memory"));
+#endif
 
   v1::BuildFile file;
   ASSERT_TRUE(Send(ann_, "this is no volume", ".nrrd", 0, &file).ok());
