@@ -57,7 +57,11 @@ class AuditedCallsTest : public ServiceTest {
 
 TEST_F(AuditedCallsTest, EveryCallArrivesOnce) {
   constexpr int kCalls = 200;
-  for (int i = 0; i < kCalls; ++i) EXPECT_TRUE(List(absl::StrCat("request-", i)).ok());
+  for (int i = 0; i < kCalls; ++i) {
+    EXPECT_TRUE(List(absl::StrCat("request-", i)).ok());
+    // The socket holds some 150 entries; when it is full for a second calls are refused.
+    if (i % 50 == 0) Calls();
+  }
   ASSERT_TRUE(Eventually([this] { return Calls().size() == kCalls; }));
   for (const auto& [request, count] : Calls()) EXPECT_EQ(count, 1) << request;
 }

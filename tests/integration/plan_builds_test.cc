@@ -311,7 +311,8 @@ TEST_F(PlanBuildsOfServerTest, ACancelledBuildEndsItsProgram) {
 
 TEST_F(PlanBuildsOfServerTest, AFailureIsOneSentenceWithoutAPathOfTheServer) {
   Start({.max_memory_bytes = int64_t{150} << 20});
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which need terabytes of addresses
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)  // which need terabytes of addresses
   const v1::PlanBuild without_memory = Watch(Create().name()).back();
   EXPECT_EQ(without_memory.state(), v1::PLAN_BUILD_STATE_FAILED);
   EXPECT_THAT(without_memory.detail(), HasSubstr("bytes of memory"));
