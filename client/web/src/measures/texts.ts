@@ -30,9 +30,10 @@ export function plusMinus(band: Band | null): string {
   return band === null ? "" : `± ${formatNumber((band.highest - band.lowest) / 2)}`;
 }
 
-/** What a whole band says, below `where`. */
-export function wholeBandText(where: string): string {
-  return `Below ${where}: where 95 of 100 patients will be if surgery and model err as published, and the material as the case states.`;
+/** What whole bands say, below `where`. */
+export function wholeBandText(where: string, bands: Iterable<Band>): string {
+  const hasMaterial = Array.from(bands).some(({ parts }) => parts !== undefined && parts.material !== null);
+  return `Below ${where}: where 95 of 100 patients will be if surgery and model err as published${hasMaterial ? ", and the material as the case states" : ""}.`;
 }
 
 /** Of a length, which is at least 0: "5.4 to 6.5". */

@@ -44,7 +44,7 @@ function captionOf(bench: Workbench, results: readonly MeasureResult[]): string 
   const [hasBand, isWhole] = [bands.length > 0, bands.some(({ parts }) => parts !== undefined)];
   return [
     `In the ${hasHeadFrame(bench.file) ? "head frame" : "scanner axes (no head frame was found)"}; forward, up and the patient’s left are positive.`,
-    isWhole ? `${wholeBandText("“after”")} Below a name: how far each of them alone would reach.` : "",
+    isWhole ? `${wholeBandText("“after”", bands)} Below a name: how far each of them alone would reach.` : "",
     hasBand && !isWhole ? "Below “after”: 95 % interval, material uncertainty only." : "",
     !isWhole && bench.hasBand && bench.whyNoBand !== "" ? `No 95 % interval: ${bench.whyNoBand}.` : "",
     bench.showsPlan ? "" : `The face that is shown is not the plan’s${hasBand ? "" : "; it has no 95 % interval"}.`,

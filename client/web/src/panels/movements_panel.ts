@@ -59,7 +59,7 @@ export function movementsPanel(bench: Workbench): HTMLElement {
 const WAYS = ["forwardMm", "leftMm", "upMm"] as const;
 
 function bandCaption(whole: readonly (MovementBand | null)[] | null, hasMaterial: boolean): string {
-  if (whole !== null) return `${wholeBandText("a number")} Below a name: how far each of them alone would reach in the total.`;
+  if (whole !== null) return `${wholeBandText("a number", whole.flatMap((band) => (band === null ? [] : [band.totalMm])))} Below a name: how far each of them alone would reach in the total.`;
   return hasMaterial ? "Below a number of the skin: 95 % interval, material uncertainty only." : "";
 }
 
