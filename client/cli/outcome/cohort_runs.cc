@@ -66,6 +66,9 @@ class FolderLock {
 absl::Status MakeFolders(const std::string& out) {
   std::error_code error;
   const bool is_cohort = fs::is_directory(CasesFolder(out), error);
+  if (fs::exists(out, error) && !fs::is_directory(out, error)) {
+    return absl::AlreadyExistsError(absl::StrCat("--out ", out, " is a file; name a new folder"));
+  }
   if (!is_cohort && fs::exists(out, error) && !fs::is_empty(out, error)) {
     return absl::AlreadyExistsError(
         absl::StrCat("--out ", out,

@@ -25,7 +25,12 @@ namespace tissueform {
 namespace {
 
 absl::StatusOr<TriangleMesh> ReadSurface(const std::string& path, const std::string& axes) {
-  TF_RETURN_IF_ERROR(CheckAxes(axes));
+  if (!CheckAxes(axes).ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--post-axes ", axes,
+                     " must be three letters, where x, y and z grow toward: L or R, A or P, "
+                     "S or I, each pair once (\"LPS\", \"RAS\")"));
+  }
   const Eigen::Matrix3d to_lps = DirectionOf(axes);
   if (to_lps.determinant() < 0) {
     return absl::InvalidArgumentError(absl::StrCat(

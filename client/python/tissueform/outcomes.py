@@ -19,6 +19,8 @@ _NOTHING_SAID = "tissueform outcome failed without a message"
 
 
 def _flags(*, models: Sequence[str], calibrate: bool, accept_findings: bool, pictures: bool) -> List[str]:
+    if isinstance(models, str):
+        raise InvalidInput(f"models is a list of names, not {models!r}", advice=f"give models=[{models!r}]")
     flags = [word for model in models for word in ("--model", model)]
     wanted = {"--calibrate": calibrate, "--accept-findings": accept_findings, "--no-pictures": not pictures}
     return flags + [flag for flag, is_wanted in wanted.items() if is_wanted]

@@ -40,6 +40,10 @@ class OutcomeTest(unittest.TestCase):
             tissueform.outcome(PLAN, self.folder, self.folder / "two", post_bone=self.face, **QUICK)
         with self.assertRaisesRegex(InvalidInput, "nothing.json"):
             tissueform.outcome(self.folder / "nothing.json", self.face, self.folder / "two", **QUICK)
+        with self.assertRaisesRegex(InvalidInput, r"models is a list.*models=\['arap'\]"):
+            tissueform.outcome(PLAN, self.face, self.folder / "two", models="arap", program=PROGRAM)
+        with self.assertRaisesRegex(InvalidInput, "--post-axes XYZ must be three letters"):
+            tissueform.outcome(PLAN, self.face, self.folder / "two", post_axes="XYZ", **QUICK)
         self.assertFalse((self.folder / "two").exists())
         with self.assertRaises(NotFound) as raised:
             tissueform.outcome(PLAN, self.face, self.folder / "two", program=self.folder / "nothing")

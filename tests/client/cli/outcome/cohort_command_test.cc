@@ -207,6 +207,8 @@ TEST_F(CohortCommandTest, WrongUseIsRefused) {
   EXPECT_THAT(
       Run({"outcome", "cohort", "list.csv", "--out", "new", "--jobs", "8", "--memory-gib", "4"}),
       FailsWith(1, HasSubstr("fewer --jobs or more --memory-gib")));
+  EXPECT_THAT(Run({"outcome", "cohort", "list.csv", "--out", "list.csv"}),
+              FailsWith(1, HasSubstr("--out list.csv is a file; name a new folder")));
   EXPECT_THAT(Run({"outcome", "cohort", "missing.csv", "--out", "new"}),
               FailsWith(1, HasSubstr("missing.csv")));
   EXPECT_THAT(Run({"outcome", "cohort", "list.csv"}), FailsWith(2, HasSubstr("--out")));
