@@ -104,9 +104,11 @@ function placeNamed({ places }: PlacedNumbers, name: string): Place {
 export async function wholeBands(face: ShownFace, answers: PlanAnswers): Promise<Map<string, Band> | null> {
   const places = new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, placeOf(face, anchor, LIPS.has(name))]));
   const numbersAt = (at: (name: string) => Vector) => new Map(measureAt(face, at).flatMap((result): [string, number][] => (result.kind === "value" ? [[result.definition.name, result.after]] : [])));
+  // Before the answers come: the face may change.
+  const results = measureFace(face);
   const doubts = await doubtOf(face.file, { places, numbersAt }, answers);
   if (doubts === null) return null;
-  return new Map(measureFace(face).flatMap((result): [string, Band][] => {
+  return new Map(results.flatMap((result): [string, Band][] => {
     const doubt = doubts.get(result.definition.name);
     if (result.kind !== "value" || doubt === undefined) return [];
     return [[result.definition.name, bandAround(result.after, { ...doubt, material: ofMaterial(result) })]];
