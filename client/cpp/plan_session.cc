@@ -39,6 +39,8 @@ SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& m
   request.fixed = problem.constraints.fixed();
   request.handles = problem.constraints.handles();
   request.contact = problem.constraints.contact();
+  request.lip_edge = problem.lip_edge;
+  request.seals_lips = problem.deformer.seal.has_value();
   request.model = problem.deformer.model;
   request.poisson_ratio = problem.deformer.preparation.poisson_ratio;
   request.gradient_field = problem.deformer.gradient_field;

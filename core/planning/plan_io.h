@@ -21,6 +21,8 @@ struct ResolveOptions {
   // Whether the plan's contact rows are used. Otherwise tissue sticks to all that the selectors
   // select, and the lips are one piece again (WeldSeam).
   bool contact = true;
+  // Whether the lips are sealed, where the plan says how (Plan::lip_edge) and contact is used.
+  bool seal = false;
 };
 
 struct PlanReadOptions {

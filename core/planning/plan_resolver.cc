@@ -123,6 +123,7 @@ absl::StatusOr<PlanProblem> ResolvePlan(const Plan& plan, TetMeshFile file,
   deformer.preparation.poisson_ratio = plan.poisson_ratio;
   deformer.preparation.mesh_is_usable = true;  // CheckUsable
   deformer.gradient_field = plan.gradient_field;
+  if (options.seal) deformer.seal = lip_edge;
   return PlanProblem{.mesh = std::move(mesh),
                      .point_data = std::move(file.point_data),
                      .cell_data = std::move(file.cell_data),

@@ -67,6 +67,7 @@ v1::SolveSummary ToSummaryProto(const Deformation& deformation, DeformationModel
   if (const auto contact = SummarizeContact(deformation.contact, model)) {
     *proto.mutable_contact() = ToProto(*contact);
   }
+  if (deformation.seal) *proto.mutable_seal() = ToProto(*deformation.seal);
   return proto;
 }
 

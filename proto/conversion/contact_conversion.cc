@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "proto/conversion/geometry_conversion.h"
 
 namespace tissueform {
@@ -83,6 +84,40 @@ absl::StatusOr<std::vector<ContactRow>> ToContactRows(const ContactRowProtos& pr
     rows.push_back(row);
   }
   return rows;
+}
+
+v1::LipEdge ToProto(const LipEdge& edge, bool sealed) {
+  v1::LipEdge proto;
+  *proto.mutable_up() = ToProto(edge.up);
+  for (const LipEdge::Pair& pair : edge.pairs) {
+    v1::LipEdge::Pair* added = proto.add_pairs();
+    added->set_upper(pair.upper);
+    added->set_lower(pair.lower);
+  }
+  proto.set_sealed(sealed);
+  return proto;
+}
+
+LipEdge ToLipEdge(const v1::LipEdge& proto) {
+  LipEdge edge{.up = ToVector(proto.up()), .pairs = {}};
+  for (const v1::LipEdge::Pair& pair : proto.pairs()) {
+    edge.pairs.push_back({.upper = pair.upper(), .lower = pair.lower()});
+  }
+  return edge;
+}
+
+v1::SealSummary ToProto(const SealAnswer& seal) {
+  v1::SealSummary proto;
+  proto.set_pair_count(static_cast<int32_t>(seal.pairs));
+  proto.set_parted_mm(seal.parted_mm);
+  proto.set_release_mm(kSealReleaseMm);
+  proto.set_released(seal.released);
+  return proto;
+}
+
+SealAnswer ToSealAnswer(const v1::SealSummary& proto) {
+  return {
+      .pairs = proto.pair_count(), .parted_mm = proto.parted_mm(), .released = proto.released()};
 }
 
 v1::ContactSummary ToProto(const ContactSummary& summary) {

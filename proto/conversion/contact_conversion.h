@@ -9,6 +9,8 @@
 #include "google/protobuf/repeated_ptr_field.h"
 
 #include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/lip_edge.h"
+#include "core/mechanics/deformation/deformer.h"
 #include "core/mechanics/problem/contact_summary.h"
 #include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/session.pb.h"
@@ -25,6 +27,13 @@ ContactRowProtos ToProto(const std::vector<ContactRow>& rows,
 // touches, an unknown handle, and too many rows. The rest is checked by ConstraintSet.
 absl::StatusOr<std::vector<ContactRow>> ToContactRows(const ContactRowProtos& protos,
                                                       const std::vector<HandleRegion>& handles);
+
+v1::LipEdge ToProto(const LipEdge& edge, bool sealed);
+// The rest is checked by CheckLipEdge.
+LipEdge ToLipEdge(const v1::LipEdge& proto);
+
+v1::SealSummary ToProto(const SealAnswer& seal);
+SealAnswer ToSealAnswer(const v1::SealSummary& proto);
 
 v1::ContactSummary ToProto(const ContactSummary& summary);
 ContactSummary ToContactSummary(const v1::ContactSummary& proto);

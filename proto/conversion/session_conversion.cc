@@ -102,6 +102,7 @@ v1::CreateSessionRequest ToProto(const SessionRequest& request) {
     handle->mutable_vertices()->Add(region.vertices.begin(), region.vertices.end());
   }
   *proto.mutable_contact() = ToProto(request.contact, request.handles);
+  if (request.lip_edge) *proto.mutable_lip_edge() = ToProto(*request.lip_edge, request.seals_lips);
   proto.set_model(ToProto(request.model));
   proto.set_poisson_ratio(request.poisson_ratio);
   *proto.mutable_gradient_field() = ToProto(request.gradient_field);
@@ -131,6 +132,10 @@ absl::StatusOr<SessionRequest> ToSessionRequest(const v1::CreateSessionRequest& 
                       ToVertices(proto.fixed_vertices(), limits.num_vertices, "fixed_vertices"));
   TF_RETURN_IF_ERROR(ReadHandles(proto, limits, &request));
   TF_ASSIGN_OR_RETURN(request.contact, ToContactRows(proto.contact(), request.handles));
+  if (proto.has_lip_edge()) {
+    request.lip_edge = ToLipEdge(proto.lip_edge());
+    request.seals_lips = proto.lip_edge().sealed();
+  }
   return request;
 }
 

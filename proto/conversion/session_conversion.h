@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "tissueform/v1/session_service.pb.h"
 
@@ -34,6 +36,8 @@ struct SessionRequest {
   std::vector<int32_t> fixed;
   std::vector<HandleRegion> handles;
   std::vector<ContactRow> contact;  // empty: tissue sticks to bone
+  std::optional<LipEdge> lip_edge;  // that a seal may hold together
+  bool seals_lips = false;          // it does
   DeformationModel model = DeformationModel::kGradientField;
   double poisson_ratio = 0.45;          // of the elastic models
   GradientFieldOptions gradient_field;  // what belongs to the server is not sent

@@ -120,6 +120,8 @@ std::string RecipeSha256(const Session& session) {
   recipe.fixed = session.constraints().fixed();
   recipe.handles = session.constraints().handles();
   recipe.contact = session.constraints().contact();
+  recipe.lip_edge = session.seal();
+  recipe.seals_lips = session.seal().has_value();
   return RequestFingerprint(ToProto(recipe));
 }
 

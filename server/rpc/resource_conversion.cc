@@ -37,6 +37,8 @@ void SetRecipe(SessionRequest request, SessionRecord* record) {
   record->fixed = std::move(request.fixed);
   record->handles = std::move(request.handles);
   record->contact = std::move(request.contact);
+  record->lip_edge = std::move(request.lip_edge);
+  record->seals_lips = request.seals_lips;
   record->model = request.model;
   record->poisson_ratio = request.poisson_ratio;
   record->gradient_field = request.gradient_field;
@@ -110,6 +112,8 @@ absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& re
   before.fixed = record.fixed;
   before.handles = record.handles;
   before.contact = record.contact;
+  before.lip_edge = record.lip_edge;
+  before.seals_lips = record.seals_lips;
   before.model = record.model;
   before.poisson_ratio = record.poisson_ratio;
   before.gradient_field = record.gradient_field;
@@ -119,6 +123,10 @@ absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& re
     *merged.mutable_fixed_vertices() = request.regions().fixed_vertices();
     *merged.mutable_handles() = request.regions().handles();
     *merged.mutable_contact() = request.regions().contact();
+    merged.clear_lip_edge();
+    if (request.regions().has_lip_edge()) {
+      *merged.mutable_lip_edge() = request.regions().lip_edge();
+    }
   }
   if (request.model() != v1::DEFORMATION_MODEL_UNSPECIFIED) merged.set_model(request.model());
   if (request.has_gradient_field()) *merged.mutable_gradient_field() = request.gradient_field();
@@ -160,6 +168,9 @@ v1::Session ToProto(const SessionView& view) {
     }
   }
   proto.set_contact_row_count(static_cast<int64_t>(record.contact.size()));
+  if (record.seals_lips) {
+    proto.set_sealed_pair_count(static_cast<int64_t>(record.lip_edge->pairs.size()));
+  }
   proto.set_state(view.session == nullptr ? v1::SESSION_STATE_STORED : v1::SESSION_STATE_READY);
   proto.set_etag(record.etag);
   proto.mutable_create_time()->set_seconds(record.created_s);

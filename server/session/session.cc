@@ -36,6 +36,7 @@ DeformerOptions OptionsOf(const SessionRecord& record) {
   options.preparation.mesh_is_usable = true;  // MeshCatalog
   options.preparation.node_order = record.node_order;
   options.gradient_field = record.gradient_field;
+  if (record.seals_lips) options.seal = record.lip_edge;
   // Told in every answer; a small part of a solve.
   options.gradient_field.compute_residual = true;
   return options;
@@ -69,6 +70,10 @@ absl::StatusOr<std::shared_ptr<Session>> Session::Create(
   TF_ASSIGN_OR_RETURN(ConstraintSet constraints,
                       ConstraintSet::Create(mesh->mesh, std::move(record.fixed),
                                             std::move(record.handles), std::move(record.contact)));
+  if (record.lip_edge) {
+    TF_RETURN_IF_ERROR(
+        CheckLipEdge(*record.lip_edge, mesh->mesh.positions(), constraints.contact()));
+  }
   TF_ASSIGN_OR_RETURN(const Eigen::VectorXd stiffness, ResolveStiffness(record, *mesh));
   std::shared_ptr<Session> session(new Session(record, std::move(mesh), std::move(constraints),
                                                preparation->strand(), budget, pool, clock));
@@ -160,13 +165,19 @@ absl::Status Session::Keep(DeformationModel model, Model made) {
   return absl::OkStatus();
 }
 
+// Sessions with free and with sealed lips share a preparation.
+ResponseRequest Session::Sealed(ResponseRequest request) const {
+  request.seal = options_.seal;
+  return request;
+}
+
 absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> Session::PrepareResponse(
     const ResponseRequest& request, const Cancellation& cancellation) {
   TF_RETURN_IF_ERROR(PrepareModel(request.model, cancellation));
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<SharedPreparation> preparation, OpenPreparation());
   making_ = true;
   absl::StatusOr<std::shared_ptr<const SharedResponse>> response =
-      preparation->PrepareResponse(request, options_.gradient_field, cancellation);
+      preparation->PrepareResponse(Sealed(request), options_.gradient_field, cancellation);
   making_ = false;
   TF_RETURN_IF_ERROR(response.status());
   auto claim = std::make_shared<PreparedAnswersRef>(*std::move(response));
@@ -183,7 +194,7 @@ absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> Session::PrepareResponse(
 std::shared_ptr<const ProgressFeed::Follower> Session::Follow(const ResponseRequest& request,
                                                               TellSession tell) const {
   const absl::StatusOr<std::shared_ptr<SharedPreparation>> preparation = OpenPreparation();
-  return preparation.ok() ? (*preparation)->Follow(request, std::move(tell)) : nullptr;
+  return preparation.ok() ? (*preparation)->Follow(Sealed(request), std::move(tell)) : nullptr;
 }
 
 absl::StatusOr<Deformation> Session::Solve(DeformationModel model,

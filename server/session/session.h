@@ -21,6 +21,7 @@
 #include "core/base/mutex.h"
 #include "core/mechanics/constraints/constraint_set.h"
 #include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/deformation/deformer.h"
 #include "server/session/clock.h"
@@ -97,6 +98,8 @@ class Session {
   DeformationModel model() const { return options_.model; }
   // Pa for every tet, or the name of a cell array of the mesh.
   const std::variant<double, std::string>& stiffness() const { return stiffness_; }
+  // Of lips that are sealed.
+  const std::optional<LipEdge>& seal() const { return options_.seal; }
   double poisson_ratio() const { return options_.preparation.poisson_ratio; }
   const GradientFieldOptions& gradient_field() const { return options_.gradient_field; }
   const PreparationSummary& preparation() const { return summary_; }  // of its own model
@@ -193,6 +196,7 @@ class Session {
   // Errors: NotFound once closed.
   absl::StatusOr<std::shared_ptr<SharedPreparation>> OpenPreparation() const;
   // Errors: NotFound once closed.
+  ResponseRequest Sealed(ResponseRequest request) const;
   absl::Status Keep(DeformationModel model, Model made);
   absl::Status MakeModel(DeformationModel model, const Cancellation& cancellation);
   absl::Status Closed() const;

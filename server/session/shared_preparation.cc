@@ -142,6 +142,7 @@ absl::StatusOr<std::shared_ptr<const SharedResponse>> SharedPreparation::Prepare
                       .tolerance_mm = request.tolerance_mm,
                       .max_rotation_rad = request.max_rotation_rad,
                       .max_estimate_mm = request.max_estimate_mm,
+                      .seal = request.seal,
                       .admission = admission,
                       .observer = Observer()},
                      cancellation);

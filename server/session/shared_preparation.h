@@ -39,6 +39,7 @@ struct ResponseRequest {
   double max_rotation_rad = 0.5236;
   double max_estimate_mm = 5;                      // of neo_hookean
   std::optional<MaterialUncertainty> ranges = {};  // of the elastic models: a band is wanted, too
+  std::optional<LipEdge> seal = {};                // of linear_elastic: that of the session
 
   friend bool operator==(const ResponseRequest&, const ResponseRequest&) = default;
 };

@@ -99,6 +99,7 @@ std::string SerializeRecord(const SessionRecord& record) {
     handle->mutable_vertices()->Add(region.vertices.begin(), region.vertices.end());
   }
   *proto.mutable_contact() = ToProto(record.contact, record.handles);
+  if (record.lip_edge) *proto.mutable_lip_edge() = ToProto(*record.lip_edge, record.seals_lips);
   proto.set_model(ToProto(record.model));
   proto.set_poisson_ratio(record.poisson_ratio);
   *proto.mutable_gradient_field() = ToProto(record.gradient_field);
@@ -129,6 +130,10 @@ absl::StatusOr<SessionRecord> ParseRecord(absl::string_view bytes) {
   absl::StatusOr<std::vector<ContactRow>> contact = ToContactRows(proto.contact(), record.handles);
   if (!contact.ok()) return Damaged(contact.status().message());
   record.contact = *std::move(contact);
+  if (proto.has_lip_edge()) {
+    record.lip_edge = ToLipEdge(proto.lip_edge());
+    record.seals_lips = proto.lip_edge().sealed();
+  }
   const absl::StatusOr<DeformationModel> model =
       ToModel(proto.model(), DeformationModel::kGradientField);
   if (!model.ok()) return Damaged(model.status().message());

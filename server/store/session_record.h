@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -13,6 +14,7 @@
 
 #include "core/mechanics/constraints/constraint_set.h"
 #include "core/mechanics/constraints/handle_pose.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/create_deformer.h"
 
 namespace tissueform {
@@ -28,6 +30,8 @@ struct SessionRecord {
   std::vector<int32_t> fixed;
   std::vector<HandleRegion> handles;
   std::vector<ContactRow> contact;  // empty: tissue sticks to bone
+  std::optional<LipEdge> lip_edge;  // that a seal may hold together
+  bool seals_lips = false;          // it does
   DeformationModel model = DeformationModel::kGradientField;
   double poisson_ratio = 0.45;          // of the elastic models
   GradientFieldOptions gradient_field;  // what a client can ask for; the server fills in the rest

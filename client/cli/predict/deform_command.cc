@@ -32,7 +32,6 @@ struct DeformOptions {
   std::string model;
   std::string stats;
   std::string deviations;
-  bool seal = false;
   int threads = AvailableProcessors();
   int solver_threads = 1;
 };
@@ -56,32 +55,6 @@ absl::StatusOr<Plan> ReadChosenPlan(const DeformOptions& options) {
   return plan;
 }
 
-absl::Status CheckSeal(const DeformOptions& options, const Plan& plan) {
-  if (!options.seal) return absl::OkStatus();
-  if (!options.reading.resolve.contact) {
-    return absl::InvalidArgumentError(
-        "--seal needs lips that are parted, and --contact off joins them; leave one of the two "
-        "out");
-  }
-  if (!plan.lip_edge) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "--seal: plan ", options.plan,
-        " has no \"seal\" in \"contact\": it is older, of the planner, or its lips are not parted "
-        "or apart in "
-        "the CT; build it again with \"lips\": {\"part\": true}, or leave --seal out"));
-  }
-  if (plan.model == DeformationModel::kLinearElastic) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("--seal: the model ", ModelName(plan.model),
-                   " does not compute the lip seal; use --model linear_elastic"));
-}
-
-absl::StatusOr<std::unique_ptr<Deformer>> CreateChosenDeformer(
-    const std::shared_ptr<MeshPreparation>& preparation, const PlanProblem& problem, bool seal) {
-  if (seal) return CreateSealedLipsDeformer(preparation, *problem.lip_edge);
-  return CreateDeformer(preparation, problem.deformer);
-}
-
 absl::StatusOr<PlanProblem> ResolveWithProgress(const Plan& plan, const ResolveOptions& options,
                                                 double* seconds) {
   const StageProgress progress("reading and checking the mesh");
@@ -98,8 +71,8 @@ absl::StatusOr<Deformation> Solve(Deformer* deformer, absl::Span<const HandlePos
 }
 
 // Fills `stats` as far as preparing and solving know it.
-absl::StatusOr<Positions> Predict(const PlanProblem& problem, bool seal,
-                                  const Deviations& deviations, PredictionStats* stats) {
+absl::StatusOr<Positions> Predict(const PlanProblem& problem, const Deviations& deviations,
+                                  PredictionStats* stats) {
   std::shared_ptr<MeshPreparation> preparation;
   std::unique_ptr<Deformer> deformer;
   {
@@ -110,7 +83,7 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, bool seal,
     TF_ASSIGN_OR_RETURN(
         preparation, MeshPreparation::Create(*problem.mesh, problem.stiffness, problem.constraints,
                                              problem.deformer.preparation));
-    TF_ASSIGN_OR_RETURN(deformer, CreateChosenDeformer(preparation, problem, seal));
+    TF_ASSIGN_OR_RETURN(deformer, CreateDeformer(preparation, problem.deformer));
   }
   TF_ASSIGN_OR_RETURN(Deformation deformation, Solve(deformer.get(), problem.poses));
   stats->preparation = deformer->preparation();
@@ -134,7 +107,7 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, bool seal,
 absl::Status RunDeform(const DeformOptions& options) {
   TF_RETURN_IF_ERROR(CheckOutputs(options));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
-  TF_RETURN_IF_ERROR(CheckSeal(options, plan));
+  TF_RETURN_IF_ERROR(CheckSeal(options.plan, options.reading.resolve, plan));
   TF_ASSIGN_OR_RETURN(const Deviations deviations, ChosenDeviations(options));
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(PlanProblem problem,
@@ -144,7 +117,7 @@ absl::Status RunDeform(const DeformOptions& options) {
   PredictionStats stats = StatsOf(problem);
   stats.solver_threads = options.solver_threads;
   stats.read_seconds = read_seconds;
-  TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, options.seal, deviations, &stats));
+  TF_ASSIGN_OR_RETURN(const Positions deformed, Predict(problem, deviations, &stats));
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed,
                                  {.material = stats.band ? &*stats.band : nullptr,
                                   .total = stats.total_band ? &*stats.total_band : nullptr},
@@ -182,7 +155,7 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   AddSolverThreads(command, "", &options->solver_threads);
-  AddPlanOptions(command, &options->reading, &options->seal);
+  AddPlanOptions(command, &options->reading, LipSealUse::kComputed);
   command->footer(
       "Examples:\n"
       "  tissueform deform plan.json --out after.vtu\n"

@@ -234,6 +234,7 @@ absl::Status Run(const DragCommandOptions& options) {
   action.sa_handler = [](int) { interrupted = true; };
   sigaction(SIGINT, &action, nullptr);
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
+  TF_RETURN_IF_ERROR(CheckSeal(options.plan, options.reading.resolve, plan));
   TF_ASSIGN_OR_RETURN(const PlanProblem problem, ResolvePlan(plan, options.reading.resolve));
   TF_ASSIGN_OR_RETURN(const std::unique_ptr<TissueformClient> client, ConnectTo(options.server));
   return Drag(client.get(), problem, options);
@@ -259,7 +260,7 @@ void AddDragCommand(CLI::App& app, CommandWork* work) {
       ->capture_default_str();
   command->add_flag("--local", options->local,
                     "fetch the prepared answers and also answer every pose locally");
-  AddPlanOptions(command, &options->reading);
+  AddPlanOptions(command, &options->reading, LipSealUse::kComputed);
   command->footer(
       "Example:\n"
       "  tissueform-server --port 50051 &\n"

@@ -47,6 +47,7 @@ absl::StatusOr<Positions> PredictOnServer(const RunOptions& options, const PlanP
   if (answer.summary().has_contact()) {
     stats->contact = ToContactSummary(answer.summary().contact());
   }
+  if (answer.summary().has_seal()) stats->seal = ToSealAnswer(answer.summary().seal());
   stats->quality = ToDeformationQuality(answer.quality());
   return DecodePositions(answer.positions(), problem.mesh->num_vertices());
 }
@@ -64,15 +65,20 @@ absl::Status Run(const RunOptions& options) {
   TF_RETURN_IF_ERROR(CheckWritable(options.out));
   if (!options.stats.empty()) TF_RETURN_IF_ERROR(CheckWritable(options.stats));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadPlan(options.plan, options.reading));
+  TF_RETURN_IF_ERROR(CheckSeal(options.plan, options.reading.resolve, plan));
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(const PlanProblem problem,
                       ReadProblem(plan, options.reading.resolve, &read_seconds));
   PredictionStats stats = StatsOf(problem);
   stats.read_seconds = read_seconds;
   TF_ASSIGN_OR_RETURN(const Positions deformed, PredictOnServer(options, problem, &stats));
-  stats.band = FindMaterialBandOrWarn(problem, deformed, /*preparation=*/nullptr);
+  if (stats.seal && !stats.seal->released) {
+    WarnOfMissingBand(problem, "it is not known of sealed lips");
+  } else {
+    stats.band = FindMaterialBandOrWarn(problem, deformed, /*preparation=*/nullptr);
+  }
   TF_RETURN_IF_ERROR(WriteResult(options.out, plan, problem, deformed,
-                                 {.material = stats.band ? &*stats.band : nullptr}));
+                                 {.material = stats.band ? &*stats.band : nullptr}, stats.seal));
   if (!options.stats.empty()) {
     stats.elastic = SummarizeElastic(problem, deformed);
     TF_RETURN_IF_ERROR(WriteStats(options.stats, stats));
@@ -95,7 +101,7 @@ void AddRunCommand(CLI::App& app, CommandWork* work) {
       ->check(VtuEnding());
   command->add_option("--stats", options->stats,
                       "also write counts, times and quality to this JSON file");
-  AddPlanOptions(command, &options->reading);
+  AddPlanOptions(command, &options->reading, LipSealUse::kComputed);
   command->footer(
       "Example, in two terminals:\n"
       "  tissueform-server --port 50051\n"

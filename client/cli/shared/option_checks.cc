@@ -10,6 +10,9 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+#include "core/planning/model_names.h"
 
 namespace tissueform {
 namespace {
@@ -28,8 +31,8 @@ std::string NonFinite(const std::string& text) {
                                                                  : "";
 }
 
-void AddSeal(CLI::App* command, bool* seal) {
-  if (seal != nullptr) {
+void AddSeal(CLI::App* command, LipSealUse use, bool* seal) {
+  if (use == LipSealUse::kComputed) {
     command->add_flag("--seal", *seal,
                       "keep lips closed that are closed in the CT, unless the mouth is opened; "
                       "only linear_elastic with contact (docs/lips.md)");
@@ -40,8 +43,8 @@ void AddSeal(CLI::App* command, bool* seal) {
                           [] {
                             throw CLI::ValidationError(
                                 "--seal",
-                                "this command does not compute the lip seal; use tissueform deform "
-                                "PLAN --out OUT.vtu --seal");
+                                "this command does not compute the lip seal; use tissueform "
+                                "deform, run or drag with --seal");
                           })
       ->group("");  // not in --help
 }
@@ -51,7 +54,7 @@ void AddSeal(CLI::App* command, bool* seal) {
 CLI::Validator VtuEnding() { return Ending(".vtu", "OUT.vtu"); }
 CLI::Validator VtpEnding() { return Ending(".vtp", "FILE.vtp"); }
 
-void AddPlanOptions(CLI::App* command, PlanReadOptions* options, bool* seal) {
+void AddPlanOptions(CLI::App* command, PlanReadOptions* options, LipSealUse seal) {
   command->add_flag("--allow-outside", options->allow_outside,
                     "allow a mesh outside the plan's folder");
   command
@@ -61,7 +64,26 @@ void AddPlanOptions(CLI::App* command, PlanReadOptions* options, bool* seal) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"on", true}, {"off", false}})
                       .description("{on,off}"))
       ->default_str("on");
-  AddSeal(command, seal);
+  AddSeal(command, seal, &options->resolve.seal);
+}
+
+absl::Status CheckSeal(const std::string& file, const ResolveOptions& options, const Plan& plan) {
+  if (!options.seal) return absl::OkStatus();
+  if (!options.contact) {
+    return absl::InvalidArgumentError(
+        "--seal needs lips that are parted, and --contact off joins them; leave one of the two "
+        "out");
+  }
+  if (!plan.lip_edge) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--seal: plan ", file,
+        " has no \"seal\" in \"contact\": it is older, of the planner, or its lips are not parted "
+        "or apart in the CT; build it again with \"lips\": {\"part\": true}, or leave --seal out"));
+  }
+  if (plan.model == DeformationModel::kLinearElastic) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("--seal: the model ", ModelName(plan.model),
+                   " does not compute the lip seal; use --model linear_elastic"));
 }
 
 void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) {

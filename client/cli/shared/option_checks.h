@@ -6,7 +6,9 @@
 #include <string>
 
 #include "CLI/CLI.hpp"
+#include "absl/status/status.h"
 
+#include "core/planning/plan.h"
 #include "core/planning/plan_io.h"
 
 namespace tissueform {
@@ -18,9 +20,17 @@ CLI::Validator VtuEnding();
 // The same for surfaces with arrays: .vtp.
 CLI::Validator VtpEnding();
 
-// Adds --allow-outside and --contact to a command that reads a plan, and --seal to one that can
-// seal lips; the others refuse it and say which command can. Both pointers outlive the parsing.
-void AddPlanOptions(CLI::App* command, PlanReadOptions* options, bool* seal = nullptr);
+// Whether a command can seal lips; the others refuse --seal and say which command can.
+enum class LipSealUse { kRefused, kComputed };
+
+// Adds --allow-outside, --contact and --seal to a command that reads a plan. `options` outlives the
+// parsing.
+void AddPlanOptions(CLI::App* command, PlanReadOptions* options,
+                    LipSealUse seal = LipSealUse::kRefused);
+
+// InvalidArgument where --seal was given and the plan of this file cannot be sealed with these
+// options.
+absl::Status CheckSeal(const std::string& file, const ResolveOptions& options, const Plan& plan);
 
 // Adds --solver-threads, for a command that makes factors alone in its process: what is given to
 // SetBlasThreads while it prepares. `threads` outlives the parsing and holds the default, 1.

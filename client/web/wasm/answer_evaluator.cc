@@ -25,7 +25,7 @@ struct Instance {
   std::vector<AnswerPose> poses;
   std::vector<float> positions;
   std::vector<float> band_mm;
-  std::vector<double> contact_forces;
+  TouchForces touch;
   double error_mm = 0;
 };
 
@@ -89,11 +89,20 @@ EXPORT(positions) const float* Positions() { return tissueform::Self().positions
 // The number of contact rows that may lift off: of each the force in Pa mm^2 is written.
 EXPORT(evaluate_contact) size_t EvaluateContact() {
   auto& self = tissueform::Self();
-  self.contact_forces = self.evaluator->ContactForcesAt(self.poses);
-  return self.contact_forces.size();
+  self.touch = self.evaluator->TouchForcesAt(self.poses);
+  return self.touch.contact.size();
 }
 EXPORT(contact_forces) const double* ContactForces() {
-  return tissueform::Self().contact_forces.data();
+  return tissueform::Self().touch.contact.data();
+}
+// Of the lips at the last `evaluate_contact`: pairs of the seal, 0 where lips are free; how far the
+// edges are parted in height before they are sealed; and whether that is too far for a seal.
+EXPORT(seal_pairs) size_t SealPairs() { return tissueform::Self().touch.seal.size(); }
+EXPORT(seal_parted_mm) double SealPartedMm() {
+  return tissueform::Self().touch.seal_state.value_or(tissueform::SealState()).parted_mm;
+}
+EXPORT(seal_released) bool SealReleased() {
+  return tissueform::Self().touch.seal_state.value_or(tissueform::SealState()).released;
 }
 
 // Whether the poses have a band; then it is written.

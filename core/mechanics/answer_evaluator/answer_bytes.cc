@@ -62,6 +62,7 @@ constexpr size_t kNumNumbers = sizeof(AnswerNumbers) / sizeof(double);
 using NumberList = std::array<double, kNumNumbers>;
 
 uint32_t VersionOf(const PortableAnswers& answers) {
+  if (!answers.seal_release.empty()) return 4;
   if (!answers.contact_gaps.empty()) return 3;
   return answers.third_lengths.empty() ? 1 : 2;
 }
@@ -81,8 +82,13 @@ size_t MatrixColumns(const AnswerSizes& sizes, uint32_t section) {
     case 44:
       return sizes.triples;
     case 51:
+    case 53:
+    case 55:
     case 60:
       return 12 * sizes.handles;
+    case 54:
+    case 56:
+      return sizes.contacts;
     default:
       return 0;
   }

@@ -14,7 +14,7 @@ namespace tissueform {
 
 // The newest that is read. Written is the lowest that has what is there: 2 with a third order,
 // which readers of 1 would pass over.
-inline constexpr uint32_t kAnswerFormatVersion = 3;
+inline constexpr uint32_t kAnswerFormatVersion = 4;
 inline constexpr size_t kMaxAnswerBytes = size_t{256} << 20;
 
 enum class AnswerError {

@@ -177,6 +177,18 @@ bool ContactFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
   return rows == 0 || IsModel(answers, AnswerModel::kLinearElastic);
 }
 
+// All of it or nothing, and only with contact.
+bool SealFits(const PortableAnswers& answers, const AnswerSizes& sizes) {
+  const size_t pairs = sizes.seal_pairs;
+  const size_t rows = sizes.contacts;
+  return answers.seal_upper_map.size() == 12 * sizes.handles * pairs &&
+         answers.seal_lower_map.size() == 12 * sizes.handles * pairs &&
+         answers.seal_upper_forces.size() == rows * pairs &&
+         answers.seal_lower_forces.size() == rows * pairs &&
+         answers.seal_stiffness.size() == pairs * pairs &&
+         answers.seal_release.size() == (pairs == 0 ? 0 : 1) && pairs <= rows;
+}
+
 // Only where there are columns of elasticity.
 bool BandFits(const PortableAnswers& answers, const AnswerSizes& sizes, bool is_gradient) {
   const PackedColumns& band = answers.band;
@@ -198,6 +210,7 @@ std::string CheckAnswers(const PortableAnswers& answers) {
   const bool is_neo = IsModel(answers, AnswerModel::kNeoHookean);
   if (!HasNothingElse(answers, is_gradient, is_neo)) return "a section belongs to another model";
   if (!ContactFits(answers, sizes)) return "the contact's sizes do not fit";
+  if (!SealFits(answers, sizes)) return "the lip seal's sizes do not fit";
   if (!BandFits(answers, sizes, is_gradient)) return "the band's sizes do not fit";
   if (is_gradient && !ExpansionFits(answers, sizes)) return "the expansion's sizes do not fit";
   if (is_neo) {

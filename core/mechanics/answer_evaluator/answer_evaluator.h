@@ -63,10 +63,10 @@ class BasicAnswerEvaluator {
   // (HasBand).
   bool Band(std::span<const AnswerPose> poses, std::vector<float>* band_mm) const;
 
-  // Forces of the unilateral contact rows in Pa mm^2, at least 0, in the order of the session's
-  // rows. Empty without such rows, and unless the poses are legal (AreLegal). Costs what the
-  // contact of an answer costs.
-  std::vector<double> ContactForcesAt(std::span<const AnswerPose> poses) const;
+  // Forces of the unilateral contact rows, in the order of the session's rows, and of the lip seal.
+  // Nothing without such rows, and unless the poses are legal (AreLegal). Costs what the contact of
+  // an answer costs.
+  TouchForces TouchForcesAt(std::span<const AnswerPose> poses) const;
 
   size_t bytes_held() const;
 

@@ -9,6 +9,10 @@ bool IsModel(const PortableAnswers& answers, AnswerModel model) {
   return answers.numbers.model == static_cast<double>(model);
 }
 
+size_t SealPairs(const PortableAnswers& answers) {
+  return answers.seal_upper_map.size() / (12 * static_cast<size_t>(answers.numbers.num_handles));
+}
+
 AnswerSizes SizesOf(const PortableAnswers& answers) {
   AnswerSizes sizes;
   sizes.handles = static_cast<size_t>(answers.numbers.num_handles);
@@ -22,7 +26,8 @@ AnswerSizes SizesOf(const PortableAnswers& answers) {
     sizes.factors = 3 * static_cast<size_t>(answers.numbers.num_polynomials) + 4 * sizes.handles;
   } else {
     sizes.contacts = answers.contact_gaps.size();
-    sizes.factors = 12 * sizes.handles + sizes.contacts;
+    sizes.seal_pairs = SealPairs(answers);
+    sizes.factors = 12 * sizes.handles + sizes.contacts + sizes.seal_pairs;
   }
   if (IsModel(answers, AnswerModel::kNeoHookean)) {
     const size_t numbers = 6 * sizes.handles;

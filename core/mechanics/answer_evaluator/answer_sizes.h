@@ -11,6 +11,9 @@ namespace tissueform {
 
 bool IsModel(const PortableAnswers& answers, AnswerModel model);
 
+// Pairs of the lip seal; 0 without one.
+size_t SealPairs(const PortableAnswers& answers);
+
 // How many there are of what is not written down by itself. REQUIRES: CheckAnswers finds nothing.
 struct AnswerSizes {
   size_t handles = 0;
@@ -22,6 +25,7 @@ struct AnswerSizes {
   size_t full_columns = 0;   // the last ones, with lower halves
   size_t nodes = 0;          // of gradient_field
   size_t contacts = 0;       // unilateral rows, of linear_elastic
+  size_t seal_pairs = 0;     // of sealed lips, of linear_elastic with contact
   size_t pairs = 0;          // of neo_hookean
   size_t triples = 0;        // of neo_hookean with a third order
   size_t full_map_cols = 0;  // of neo_hookean

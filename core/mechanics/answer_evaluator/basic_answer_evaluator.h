@@ -87,13 +87,9 @@ bool BasicAnswerEvaluator<Matrix>::Band(std::span<const AnswerPose> poses,
 }
 
 template <typename Matrix>
-std::vector<double> BasicAnswerEvaluator<Matrix>::ContactForcesAt(
-    std::span<const AnswerPose> poses) const {
+TouchForces BasicAnswerEvaluator<Matrix>::TouchForcesAt(std::span<const AnswerPose> poses) const {
   if (!AreLegal(answers_, poses)) return {};
-  std::vector<double> factors = FactorsOf(answers_, poses).factors;
-  const auto rows = static_cast<std::ptrdiff_t>(answers_.contact_gaps.size());
-  contact_.Append(answers_, &factors);
-  return {factors.end() - rows, factors.end()};
+  return contact_.At(answers_, FactorsOf(answers_, poses).factors);
 }
 
 template <typename Matrix>

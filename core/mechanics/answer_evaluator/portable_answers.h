@@ -97,6 +97,17 @@ struct PortableAnswers {
   std::vector<double> contact_gap_map;     // #rows by 12 #handles
   std::vector<double> contact_compliance;  // #rows by #rows
 
+  // With contact, where the lips are sealed: how the heights (mm) of the edges' vertices change
+  // with the coefficients of poses and with contact forces, the forces that a unit of height takes
+  // (Pa mm^2 per mm, symmetric), and how far the edges may be parted (mm, one number). The seal's
+  // forces, one per pair, are then the last factors of the columns. See docs/prepared-answers.md.
+  std::vector<double> seal_upper_map;     // #pairs by 12 #handles
+  std::vector<double> seal_upper_forces;  // #pairs by #rows
+  std::vector<double> seal_lower_map;     // #pairs by 12 #handles
+  std::vector<double> seal_lower_forces;  // #pairs by #rows
+  std::vector<double> seal_stiffness;     // #pairs by #pairs
+  std::vector<double> seal_release;
+
   // Of the elastic models where ranges of the material are known: how the free vertices' answer
   // changes with each variable, three rows a vertex, those of all variables one after the other;
   // upper halves only. band_map is #columns by 12 #handles.
@@ -139,6 +150,12 @@ void VisitSections(Answers& answers, const Visitor& visit) {
   visit(50, answers.contact_gaps);
   visit(51, answers.contact_gap_map);
   visit(52, answers.contact_compliance);
+  visit(53, answers.seal_upper_map);
+  visit(54, answers.seal_upper_forces);
+  visit(55, answers.seal_lower_map);
+  visit(56, answers.seal_lower_forces);
+  visit(57, answers.seal_stiffness);
+  visit(58, answers.seal_release);
   visit(60, answers.band_map);
   visit(61, answers.band.steps);
   visit(62, answers.band.upper);

@@ -3,6 +3,8 @@
 
 #include "core/mechanics/deformation/create_deformer.h"
 
+#include "absl/strings/str_cat.h"
+
 #include "core/base/status_macros.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/linear_elastic_deformer.h"
@@ -46,15 +48,23 @@ absl::string_view ModelsWithPreparedAnswers(const ConstraintSet& constraints) {
              : "linear_elastic, which alone has them with contact";
 }
 
+absl::Status CheckComputesSeal(DeformationModel model, const std::optional<LipEdge>& seal) {
+  if (!seal || model == DeformationModel::kLinearElastic) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "the model ", TraitsOf(model).name, " does not compute the lip seal; use linear_elastic"));
+}
+
 absl::StatusOr<std::unique_ptr<Deformer>> CreateDeformer(
     const std::shared_ptr<MeshPreparation>& preparation, const DeformerOptions& options,
     const Cancellation& cancellation) {
+  TF_RETURN_IF_ERROR(CheckComputesSeal(options.model, options.seal));
   switch (options.model) {
     case DeformationModel::kGradientField:
       break;
     case DeformationModel::kArap:
       return CreateArapDeformer(preparation, options.arap, cancellation);
     case DeformationModel::kLinearElastic:
+      if (options.seal) return CreateSealedLipsDeformer(preparation, *options.seal, cancellation);
       return CreateLinearElasticDeformer(preparation, cancellation);
     case DeformationModel::kNeoHookean:
       return CreateNeoHookeanDeformer(preparation, options.neo_hookean, cancellation);

@@ -4,12 +4,15 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
 #include "core/base/cancellation.h"
 #include "core/mechanics/constraints/constraint_set.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/arap_deformer.h"
 #include "core/mechanics/deformation/deformer.h"
 #include "core/mechanics/deformation/gradient_field_deformer.h"
@@ -28,7 +31,11 @@ struct DeformerOptions {
   GradientFieldOptions gradient_field;  // backend, admission and threads are the preparation's
   ArapOptions arap;
   NeoHookeanOptions neo_hookean;
+  std::optional<LipEdge> seal = {};  // lips that linear_elastic seals; other models refuse it
 };
+
+// InvalidArgument where lips are to be sealed and the model is not linear_elastic.
+absl::Status CheckComputesSeal(DeformationModel model, const std::optional<LipEdge>& seal);
 
 // Whether the model with these settings needs several linear solves for an answer.
 bool Iterates(DeformationModel model, const GradientFieldOptions& gradient_field);

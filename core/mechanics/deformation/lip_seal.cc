@@ -55,18 +55,48 @@ absl::StatusOr<std::unique_ptr<LipSeal>> LipSeal::Create(const LipEdge& edge,
   return seal;
 }
 
-absl::Status LipSeal::Condense(const Cancellation& cancellation) {
-  const SparseMatrix& rows = contact_.directions();
-  Eigen::MatrixXd seal_compliance(lower_.cols(), lower_.cols());
-  Eigen::MatrixXd gaps_of_seal(rows.cols(), lower_.cols());
+absl::Status LipSeal::SolveForPairs(
+    const std::function<void(Eigen::Index first, const Eigen::MatrixXd& responses)>& take,
+    const Cancellation& cancellation) const {
   for (Eigen::Index first = 0; first < lower_.cols(); first += kPairsPerPass) {
     TF_RETURN_IF_ERROR(cancellation.Check());
     const Eigen::Index count = std::min(kPairsPerPass, lower_.cols() - first);
     TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
                         contact_.Respond(lower_.middleCols(first, count)));
-    seal_compliance.middleCols(first, count).noalias() = lower_.transpose() * responses;
-    gaps_of_seal.middleCols(first, count).noalias() = rows.transpose() * responses;
+    take(first, responses);
   }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Eigen::MatrixXd> LipSeal::ForceColumns(const std::vector<int32_t>& vertices,
+                                                      const Cancellation& cancellation) const {
+  Eigen::MatrixXd columns(3 * static_cast<Eigen::Index>(vertices.size()), lower_.cols());
+  TF_RETURN_IF_ERROR(SolveForPairs(
+      [&](Eigen::Index first, const Eigen::MatrixXd& responses) {
+        for (size_t v = 0; v < vertices.size(); ++v) {
+          columns.block(3 * static_cast<Eigen::Index>(v), first, 3, responses.cols()) =
+              responses.middleRows(3 * Eigen::Index{vertices[v]}, 3);
+        }
+      },
+      cancellation));
+  return columns;
+}
+
+Eigen::MatrixXd LipSeal::Stiffness() const {
+  return Symmetric(seal_stiffness_.solve(Eigen::MatrixXd::Identity(lower_.cols(), lower_.cols())));
+}
+
+absl::Status LipSeal::Condense(const Cancellation& cancellation) {
+  const SparseMatrix& rows = contact_.directions();
+  Eigen::MatrixXd seal_compliance(lower_.cols(), lower_.cols());
+  Eigen::MatrixXd gaps_of_seal(rows.cols(), lower_.cols());
+  TF_RETURN_IF_ERROR(SolveForPairs(
+      [&](Eigen::Index first, const Eigen::MatrixXd& responses) {
+        seal_compliance.middleCols(first, responses.cols()).noalias() =
+            lower_.transpose() * responses;
+        gaps_of_seal.middleCols(first, responses.cols()).noalias() = rows.transpose() * responses;
+      },
+      cancellation));
   TF_RETURN_IF_ERROR(CheckPairsMove(seal_compliance));
   seal_stiffness_.compute(Symmetric(seal_compliance));
   if (seal_stiffness_.info() != Eigen::Success) {

@@ -3,7 +3,9 @@
 
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include <Eigen/Cholesky>
@@ -48,6 +50,13 @@ class LipSeal {
     return lower_.transpose() * displacements;
   }
 
+  // Css^-1 in Pa mm^2 per mm, #pairs by #pairs, symmetric to the bit.
+  Eigen::MatrixXd Stiffness() const;
+  // K^-1 S at these vertices: 3 #vertices by #pairs, a vertex' coordinates in turn. Errors: those
+  // of ElasticContact::Respond, Cancelled.
+  absl::StatusOr<Eigen::MatrixXd> ForceColumns(const std::vector<int32_t>& vertices,
+                                               const Cancellation& cancellation = {}) const;
+
   // C - Cus Css^-1 Cus^T, #rows by #rows, symmetric to the bit, positive semi-definite.
   const Eigen::MatrixXd& compliance() const { return compliance_; }
   // q + Cus Css^-1 r.
@@ -61,6 +70,10 @@ class LipSeal {
  private:
   LipSeal(const LipEdge& edge, const ElasticContact& contact);
 
+  // Calls take(first pair, K^-1 S of some pairs, 3 #V by their number) until all were taken.
+  absl::Status SolveForPairs(
+      const std::function<void(Eigen::Index first, const Eigen::MatrixXd& responses)>& take,
+      const Cancellation& cancellation) const;
   absl::Status Condense(const Cancellation& cancellation);
   absl::Status CheckPairsMove(const Eigen::MatrixXd& seal_compliance) const;
   absl::Status CheckRowsMove() const;

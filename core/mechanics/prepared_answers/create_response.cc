@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
+#include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/prepared_answers/linear_elastic_response.h"
 #include "core/mechanics/prepared_answers/neo_hookean_response.h"
@@ -21,10 +22,12 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateResponse(
     TF_RETURN_IF_ERROR(CheckWithoutContact(preparation->constraints(),
                                            absl::StrCat(model.name, " in prepared answers")));
   }
+  TF_RETURN_IF_ERROR(CheckComputesSeal(options.model, options.seal));
   if (options.model == DeformationModel::kLinearElastic) {
     return CreateLinearElasticResponse(preparation, vertices,
                                        {.tolerance_mm = options.tolerance_mm,
                                         .max_rotation_rad = options.max_rotation_rad,
+                                        .seal = options.seal,
                                         .admission = options.admission,
                                         .observer = options.observer},
                                        cancellation);

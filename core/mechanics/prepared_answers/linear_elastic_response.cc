@@ -10,9 +10,12 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/base/status_macros.h"
-#include "core/mechanics/contact/lcp_solver.h"
+#include "core/mechanics/answer_evaluator/answer_sizes.h"
+#include "core/mechanics/answer_evaluator/contact_forces.h"
 #include "core/mechanics/deformation/deformation_checks.h"
 #include "core/mechanics/deformation/elastic_contact.h"
+#include "core/mechanics/deformation/linear_elastic_deformer.h"
+#include "core/mechanics/deformation/lip_seal.h"
 #include "core/mechanics/prepared_answers/chosen_vertices.h"
 #include "core/mechanics/prepared_answers/compressed_columns.h"
 #include "core/mechanics/prepared_answers/pose_samples.h"
@@ -20,50 +23,94 @@
 namespace tissueform {
 namespace {
 
-// Of poses and of unilateral contact.
-Eigen::Index NumColumns(const MeshPreparation& preparation) {
+// Of poses, of unilateral contact and of a seal.
+Eigen::Index NumColumns(const MeshPreparation& preparation, const std::optional<LipEdge>& seal) {
   const auto lifts_off = [](const ContactRow& row) { return !row.bilateral; };
   return ElasticSystem::kColumnsPerHandle *
              static_cast<Eigen::Index>(preparation.constraints().handles().size()) +
-         std::ranges::count_if(preparation.constraints().contact(), lifts_off);
+         std::ranges::count_if(preparation.constraints().contact(), lifts_off) +
+         (seal ? static_cast<Eigen::Index>(seal->pairs.size()) : 0);
 }
 
-// Uses of the poses with the contact forces that they cause below them. A row that no pose presses
-// gets the mean force of the others in one more use, so that its column is not given up.
-Eigen::MatrixXd WithForces(const ElasticContact& contact, const Eigen::MatrixXd& uses) {
-  const auto num_rows = static_cast<Eigen::Index>(contact.rows().size());
-  LcpSolver solver({contact.compliance().data(), static_cast<size_t>(contact.compliance().size())},
-                   contact.rows().size());
-  Eigen::MatrixXd with = Eigen::MatrixXd::Zero(uses.rows() + num_rows, uses.cols() + 1);
-  with.topLeftCorner(uses.rows(), uses.cols()) = uses;
+// Uses of the poses with the forces of contact and of the seal that they cause below them. A force
+// that no pose causes gets the mean of the others in one more use, so that its column is not given
+// up.
+Eigen::MatrixXd WithForces(const PortableAnswers& answers, const Eigen::MatrixXd& uses) {
+  const ContactForces contact(answers);
+  const auto num_forces =
+      static_cast<Eigen::Index>(answers.contact_gaps.size() + SealPairs(answers));
+  Eigen::MatrixXd with = Eigen::MatrixXd::Zero(uses.rows() + num_forces, uses.cols() + 1);
   for (Eigen::Index use = 0; use < uses.cols(); ++use) {
-    const Eigen::VectorXd gaps = contact.Gaps(uses.col(use));
-    const LcpSolution& solution = solver.Solve({gaps.data(), contact.rows().size()});
-    with.col(use).tail(num_rows) =
-        Eigen::Map<const Eigen::VectorXd>(solution.multipliers.data(), num_rows);
+    std::vector<double> factors(uses.col(use).begin(), uses.col(use).end());
+    contact.Append(answers, &factors);
+    with.col(use) = Eigen::Map<const Eigen::VectorXd>(factors.data(), with.rows());
   }
-  const Eigen::VectorXd means = with.bottomRows(num_rows).rowwise().mean();
-  with.col(uses.cols()).tail(num_rows) =
-      (means.array() > 0).select(0.0, Eigen::VectorXd::Constant(num_rows, means.maxCoeff()));
+  const Eigen::VectorXd means =
+      with.bottomLeftCorner(num_forces, uses.cols()).cwiseAbs().rowwise().sum() /
+      static_cast<double>(with.cols());
+  with.col(uses.cols()).tail(num_forces) =
+      (means.array() > 0).select(0.0, Eigen::VectorXd::Constant(num_forces, means.maxCoeff()));
   return with;
 }
 
-// Writes the contact of the answers, and gives columns and uses the parts of contact forces.
+template <typename Matrix>
+std::vector<double> ListOf(const Matrix& matrix) {
+  return {matrix.data(), matrix.data() + matrix.size()};
+}
+
+void Append(const Eigen::MatrixXd& more, Eigen::MatrixXd* columns) {
+  Eigen::MatrixXd both(columns->rows(), columns->cols() + more.cols());
+  both << *columns, more;
+  *columns = std::move(both);
+}
+
+// Writes the contact of the answers, and gives columns the parts of contact forces.
 absl::Status AddContact(const ElasticContact& contact, const std::vector<int32_t>& free,
                         const Cancellation& cancellation, PortableAnswers* answers,
-                        Eigen::MatrixXd* columns, ColumnWeights* uses) {
-  const auto list = [](const auto& matrix) {
-    return std::vector<double>(matrix.data(), matrix.data() + matrix.size());
-  };
-  answers->contact_gaps = list(contact.gaps_at_rest());
-  answers->contact_gap_map = list(contact.gap_columns());
-  answers->contact_compliance = list(contact.compliance());
+                        Eigen::MatrixXd* columns) {
+  answers->contact_gaps = ListOf(contact.gaps_at_rest());
+  answers->contact_gap_map = ListOf(contact.gap_columns());
+  answers->contact_compliance = ListOf(contact.compliance());
   TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd of_forces, contact.ForceColumns(free, cancellation));
-  Eigen::MatrixXd both(columns->rows(), columns->cols() + of_forces.cols());
-  both << *columns, of_forces;
-  *columns = std::move(both);
-  uses->typical = WithForces(contact, uses->typical);
-  uses->widest = WithForces(contact, uses->widest);
+  Append(of_forces, columns);
+  return absl::OkStatus();
+}
+
+// Of responses at the edge's vertices, a vertex' coordinates in turn.
+Eigen::MatrixXd HeightsOf(const Eigen::MatrixXd& responses, const Eigen::Vector3d& up) {
+  Eigen::MatrixXd heights(responses.rows() / 3, responses.cols());
+  for (Eigen::Index p = 0; p < heights.rows(); ++p) {
+    heights.row(p) = up.transpose() * responses.middleRows(3 * p, 3);
+  }
+  return heights;
+}
+
+std::vector<int32_t> VerticesOf(const LipEdge& edge, int32_t LipEdge::Pair::*which) {
+  std::vector<int32_t> vertices;
+  for (const LipEdge::Pair& pair : edge.pairs) vertices.push_back(pair.*which);
+  return vertices;
+}
+
+// Writes the seal of the answers, and gives columns the parts of its forces. REQUIRES: AddContact.
+absl::Status AddSeal(const LipEdge& edge, const ElasticSystem& elastic,
+                     const ElasticContact& contact, const std::vector<int32_t>& free,
+                     const Cancellation& cancellation, PortableAnswers* answers,
+                     Eigen::MatrixXd* columns) {
+  TF_ASSIGN_OR_RETURN(const std::unique_ptr<LipSeal> seal,
+                      LipSeal::Create(edge, contact, cancellation));
+  const std::vector<int32_t> upper = VerticesOf(edge, &LipEdge::Pair::upper);
+  const std::vector<int32_t> lower = VerticesOf(edge, &LipEdge::Pair::lower);
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd on_upper, contact.ForceColumns(upper, cancellation));
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd on_lower, contact.ForceColumns(lower, cancellation));
+  const Eigen::MatrixXd& of_poses = elastic.response_columns();
+  answers->seal_upper_map = ListOf(HeightsOf(RowsOfVertices(of_poses, upper), edge.up));
+  answers->seal_upper_forces = ListOf(HeightsOf(on_upper, edge.up));
+  answers->seal_lower_map = ListOf(HeightsOf(RowsOfVertices(of_poses, lower), edge.up));
+  answers->seal_lower_forces = ListOf(HeightsOf(on_lower, edge.up));
+  answers->seal_stiffness = ListOf(seal->Stiffness());
+  answers->seal_release = {kSealReleaseMm};
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd of_seal, seal->ForceColumns(free, cancellation));
+  Append(of_seal, columns);
   return absl::OkStatus();
 }
 
@@ -97,8 +144,10 @@ ColumnWeights ElasticUses(const MeshPreparation& preparation, const ElasticSyste
           .widest = CoefficientsOf(elastic, SamplePoses(centroids, widest, kSamples))};
 }
 
-int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices) {
-  return CompressedColumnsBytes(num_vertices, ColumnRows::kCoordinates, NumColumns(preparation));
+int64_t LinearElasticResponseBytes(const MeshPreparation& preparation,
+                                   const std::optional<LipEdge>& seal, Eigen::Index num_vertices) {
+  return CompressedColumnsBytes(num_vertices, ColumnRows::kCoordinates,
+                                NumColumns(preparation, seal));
 }
 
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
@@ -110,10 +159,14 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
                                                    "; it must be a positive number"));
   }
   TF_RETURN_IF_ERROR(CheckChosenVertices(vertices, preparation->mesh().num_vertices()));
+  if (options.seal) {
+    TF_RETURN_IF_ERROR(CheckLipEdge(*options.seal, preparation->mesh().positions(),
+                                    preparation->constraints().contact()));
+  }
   TF_RETURN_IF_ERROR(cancellation.Check());
   if (options.admission) {
-    TF_RETURN_IF_ERROR(options.admission(
-        LinearElasticResponseBytes(*preparation, static_cast<Eigen::Index>(vertices.size()))));
+    TF_RETURN_IF_ERROR(options.admission(LinearElasticResponseBytes(
+        *preparation, options.seal, static_cast<Eigen::Index>(vertices.size()))));
   }
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
   // Turned, not solved for: too short to be counted.
@@ -131,12 +184,18 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
   ColumnWeights uses = ElasticUses(*preparation, *elastic, options.max_rotation_rad);
   TF_ASSIGN_OR_RETURN(const ElasticContact* contact, preparation->Contact(cancellation));
   if (!contact->rows().empty()) {
-    TF_RETURN_IF_ERROR(AddContact(*contact, free, cancellation, &answers, &columns, &uses));
+    TF_RETURN_IF_ERROR(AddContact(*contact, free, cancellation, &answers, &columns));
+    if (options.seal) {
+      TF_RETURN_IF_ERROR(
+          AddSeal(*options.seal, *elastic, *contact, free, cancellation, &answers, &columns));
+    }
+    uses.typical = WithForces(answers, uses.typical);
+    uses.widest = WithForces(answers, uses.widest);
   }
   CompressColumns(rest(free, Eigen::all), ColumnRows::kCoordinates, columns, uses,
                   options.tolerance_mm, &answers);
   return std::make_unique<VertexResponse>(std::move(answers),
-                                          static_cast<int>(NumColumns(*preparation)));
+                                          static_cast<int>(NumColumns(*preparation, options.seal)));
 }
 
 }  // namespace tissueform

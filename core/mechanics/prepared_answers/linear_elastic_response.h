@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
 
 #include "core/base/cancellation.h"
 #include "core/base/preparation_progress.h"
+#include "core/mechanics/constraints/lip_edge.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
 #include "core/mechanics/prepared_answers/column_compression.h"
 #include "core/mechanics/prepared_answers/vertex_response.h"
@@ -22,6 +24,8 @@ struct LinearElasticResponseOptions {
   double tolerance_mm = 0.01;  // of any chosen vertex against the direct solve
   // Of every handle: as many digits of the columns are kept as such poses need.
   double max_rotation_rad = 30.0 * std::numbers::pi / 180.0;
+  // Lips that are sealed (docs/lips.md): only with contact rows.
+  std::optional<LipEdge> seal = {};
   // May be empty. Called with the bytes that the response needs at most, while it is made and
   // later, before any of them is allocated.
   FactorAdmission admission = nullptr;
@@ -35,7 +39,8 @@ ColumnWeights ElasticUses(const MeshPreparation& preparation, const ElasticSyste
                           double max_rotation_rad);
 
 // Bytes that a response of so many vertices needs at most, while it is made; 12 columns a handle.
-int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::Index num_vertices);
+int64_t LinearElasticResponseBytes(const MeshPreparation& preparation,
+                                   const std::optional<LipEdge>& seal, Eigen::Index num_vertices);
 
 // Linear elasticity at `vertices` (any order), from the columns of ElasticSystem. The model is
 // linear in the displacement of a handle, which any pose makes from 12 columns, so nothing is
@@ -46,8 +51,8 @@ int64_t LinearElasticResponseBytes(const MeshPreparation& preparation, Eigen::In
 // preparation.
 //
 // Errors: InvalidArgument (a vertex outside [0, #V), no vertex, a tolerance that is not a positive
-// number), those of MeshPreparation::Elastic; what the admission says, before anything is
-// allocated.
+// number), those of MeshPreparation::Elastic, CheckLipEdge and LipSeal::Create; what the admission
+// says, before anything is allocated.
 absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
     const std::shared_ptr<MeshPreparation>& preparation, const std::vector<int32_t>& vertices,
     const LinearElasticResponseOptions& options, const Cancellation& cancellation = {});

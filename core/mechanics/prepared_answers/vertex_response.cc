@@ -33,8 +33,8 @@ double VertexResponse::ErrorBoundMm(absl::Span<const HandlePose> poses) const {
   return evaluator_.ErrorMm(ToAnswerPoses(poses));
 }
 
-std::vector<double> VertexResponse::ContactForcesAt(absl::Span<const HandlePose> poses) const {
-  return evaluator_.ContactForcesAt(ToAnswerPoses(poses));
+TouchForces VertexResponse::TouchForcesAt(absl::Span<const HandlePose> poses) const {
+  return evaluator_.TouchForcesAt(ToAnswerPoses(poses));
 }
 
 bool VertexResponse::error_is_estimate() const {

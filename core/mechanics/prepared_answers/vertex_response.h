@@ -52,7 +52,7 @@ class VertexResponse {
   std::optional<double> Answer(absl::Span<const HandlePose> poses, FloatPositions* positions) const;
 
   // As AnswerEvaluator has them.
-  std::vector<double> ContactForcesAt(absl::Span<const HandlePose> poses) const;
+  TouchForces TouchForcesAt(absl::Span<const HandlePose> poses) const;
 
   // All that AnswerEvaluator, or a program that is not ours, needs to give the same answers; see
   // docs/prepared-answers.md. Copies: as large as what is held.

@@ -113,7 +113,8 @@ TEST_F(ContactResponseTest, IsTheDirectAnswerWithinItsBound) {
     const double distance =
         (Answer(pose).cast<double>() - direct.positions).rowwise().norm().maxCoeff();
     EXPECT_LE(distance, response_->ErrorBoundMm({pose}));
-    EXPECT_LE(RelativeDistance(response_->ContactForcesAt({pose}), direct.contact.forces), 1e-6);
+    EXPECT_LE(RelativeDistance(response_->TouchForcesAt({pose}).contact, direct.contact.forces),
+              1e-6);
     covered += response_->Covers({pose}) ? 1 : 0;
     const auto open = std::ranges::count(direct.contact.forces, 0.0);
     in_part += open > 0 && open < std::ssize(direct.contact.forces) ? 1 : 0;

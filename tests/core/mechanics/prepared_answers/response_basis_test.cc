@@ -333,7 +333,7 @@ TEST(LinearElasticResponseTest, EqualsTheModelWithinItsBound) {
     EXPECT_EQ(response->num_terms_before(), 12 * num_handles);
     EXPECT_LE(response->num_terms(), 12 * num_handles);
     EXPECT_LT(response->bytes_held(),
-              LinearElasticResponseBytes(*preparation, mesh.num_vertices()));
+              LinearElasticResponseBytes(*preparation, std::nullopt, mesh.num_vertices()));
     for (const double angle : {0.0, 0.2, 0.6, 1.0, 6.0}) {
       const auto poses = RandomPoses(num_handles, angle, 0.1, mesh.BoundingBoxDiagonal(), &random);
       FloatPositions positions;
