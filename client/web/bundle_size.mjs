@@ -15,6 +15,7 @@ const PARTS = {
   bone_worker: 16 * KIB,
   charlswasm_decode: 64 * KIB,
   moving_export: 16 * KIB,
+  movement_bands: 4 * KIB,
   new_plan_page: 28 * KIB,
   oidc_login: 16 * KIB,
   opened_ct: 4 * KIB,
@@ -26,6 +27,7 @@ const PARTS = {
   report_sheet: 16 * KIB,
   side_by_side_page: 16 * KIB,
   slice_views: 16 * KIB,
+  sticking_case: 4 * KIB,
   volume_worker: 80 * KIB,
   whole_band: 16 * KIB,
 };

@@ -87,6 +87,46 @@ test("the jaw opens, and the lips part; closed again they touch and do not pass 
   await page.close();
 });
 
+/** Heights of the two edges of the seal above each other, at most. */
+function edgesApart(page: Page): Promise<number> {
+  return page.evaluate(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    const places = new Map(Array.from(bench.file.followed as Int32Array, (vertex, place) => [vertex, place]));
+    const up = (vertex: number) => bench.newest.displacements[3 * (places.get(vertex) as number) + 2];
+    return Math.max(...bench.file.sessionRequest.lipEdge.pairs.map(({ upper, lower }: any) => Math.abs(up(upper) - up(lower))));
+  }) as Promise<number>;
+}
+
+/** The page's own answer and the server's full one of the same poses. */
+async function bothAnswers(page: Page): Promise<[number[], number[]]> {
+  const own = await page.evaluate(() => Array.from((globalThis as unknown as Hook).tissueform.bench.newest.displacements as Float32Array));
+  return [own, await serverAnswer(page)];
+}
+
+test("sealed lips stay closed as the command line has them", async () => {
+  const { page, faults } = await openFace("lips", true);
+  await typeMove(page, "Up", "-3");
+  await page.getByText(/Lips up to (?!0\.0)\d\.\d mm apart\.$/).waitFor();
+  expect(await edgesApart(page)).toBeGreaterThan(0.5);
+  const reloaded = page.waitForEvent("load");
+  await page.getByLabel("Contact").selectOption({ label: "The same, closed lips stay closed" });
+  await reloaded;
+  await live(page);
+  await page.getByText(/Lips are held closed, which would be up to \d\.\d mm apart in height: posture, not mechanics\.$/).waitFor();
+  // The lower edge is held where the upper one is while lips are free; then that one moves a little.
+  expect(await edgesApart(page)).toBeLessThan(0.1);
+  expect(farthest(...(await bothAnswers(page)))).toBeLessThan(MOVING_FILE_MM);
+  expect(await page.getByRole("radiogroup", { name: "Model" }).locator("strong").allTextContents()).toEqual(["Linear elastic"]);
+  expect(await seriousFindings(page)).toEqual([]);
+
+  await saveExport(planner, page, "Case file", "tissueform-case.tfcase");
+  const path = await saveExport(planner, page, "Plan JSON", "tissueform-plan.json");
+  const out = join(planner.folder, "sealed.vtu");
+  expect(execFileSync(join(BIN, "tissueform"), ["deform", path, "--seal", "--out", out], { encoding: "utf8" })).toMatch(/sealed: [1-9]\d* pairs, released: no/);
+  expect(faults).toEqual([]);
+  await page.close();
+});
+
 test("without contact it is the face in one piece, with the same plan, and back again", async () => {
   const { page, faults } = await openFace("lips", true);
   await typeMove(page, "Up", "0");

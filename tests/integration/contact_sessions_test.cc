@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 
 #include "client/cpp/plan_session.h"
 #include "core/mechanics/deformation/create_deformer.h"
+#include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "core/mechanics/problem/contact_summary.h"
 #include "proto/conversion/contact_conversion.h"
 #include "proto/conversion/material_conversion.h"
@@ -55,6 +57,14 @@ class ContactSessionsTest : public ServiceTest {
         .deformer = {},
         .uncertainty = {}};
     problem.deformer.model = DeformationModel::kLinearElastic;
+    return problem;
+  }
+
+  // With the seal of the lips, or with an edge that could be sealed.
+  PlanProblem SealProblem(bool sealed) const {
+    PlanProblem problem = Problem(block_.rows);
+    problem.lip_edge = block_.Edge();
+    if (sealed) problem.deformer.seal = problem.lip_edge;
     return problem;
   }
 
@@ -231,6 +241,84 @@ TEST_F(ContactSessionsTest, ABandOfUncertaintyIsRefusedAndNotAskedForByPlans) {
   EXPECT_THAT(client->OpenStream(session.name(), options), IsOk());
 }
 
+TEST_F(ContactSessionsTest, SealedLipsAreThoseOfThisProcessAndFreeOnesStayFree) {
+  const auto client = Connect();
+  const PlanProblem free = SealProblem(false);
+  const PlanProblem sealed = SealProblem(true);
+  const v1::Session one = MakeContactSession(client.get(), free);
+  const v1::Session other = MakeContactSession(client.get(), sealed);
+  EXPECT_EQ(one.sealed_pair_count(), 0);
+  EXPECT_EQ(other.sealed_pair_count(), 3);
+  DeformStream::Options prepared;
+  prepared.prepared.emplace();
+  const std::vector<std::string> frames = Drag(client.get(), other, prepared);
+  const std::vector<std::string> of_free = Drag(client.get(), one, prepared);
+  double sealed_by_mm = 0;
+  for (size_t i = 0; i < Poses().size(); ++i) {
+    const HandlePose pose = Poses()[i];
+    const Deformation expected = Solve(sealed, pose);
+    ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
+                         client->DeformOnce(other.name(), TopPose(pose)));
+    EXPECT_EQ(answer.positions(), Float32Bytes(expected.positions));
+    ASSERT_TRUE(answer.summary().has_seal());
+    EXPECT_EQ(ToSealAnswer(answer.summary().seal()), expected.seal);
+    EXPECT_EQ(answer.summary().seal().release_mm(), kSealReleaseMm);
+    ASSERT_OK_AND_ASSIGN(const Positions dragged,
+                         DecodePositions(frames[i], expected.positions.rows()));
+    EXPECT_LT((dragged - expected.positions).rowwise().norm().maxCoeff(), 0.01);
+    const Positions parted = Solve(free, pose).positions;
+    EXPECT_EQ(Answer(client.get(), one, pose), Float32Bytes(parted));
+    ASSERT_OK_AND_ASSIGN(const Positions free_frame, DecodePositions(of_free[i], parted.rows()));
+    EXPECT_LT((free_frame - parted).rowwise().norm().maxCoeff(), 0.01);
+    sealed_by_mm = std::max(sealed_by_mm, (expected.positions - parted).cwiseAbs().maxCoeff());
+  }
+  EXPECT_GT(sealed_by_mm, 0.1);
+}
+
+TEST_F(ContactSessionsTest, PredictionsTellSealedLipsFromFreeOnes) {
+  const auto client = Connect();
+  std::vector<std::string> recipes;
+  for (const PlanProblem& problem : {Problem(block_.rows), SealProblem(false), SealProblem(true)}) {
+    const v1::Session session = MakeContactSession(client.get(), problem);
+    ASSERT_OK_AND_ASSIGN(const v1::Prediction prediction,
+                         client->predictions().Create(session.name(), TopPose(Poses()[1])));
+    EXPECT_EQ(prediction.summary().has_seal(), problem.deformer.seal.has_value());
+    recipes.push_back(prediction.recipe_sha256());
+  }
+  EXPECT_EQ(recipes[0], recipes[1]) << "an edge that is not sealed changes no answer";
+  EXPECT_NE(recipes[1], recipes[2]);
+}
+
+TEST_F(ContactSessionsTest, BadSealsAreRefused) {
+  const auto client = Connect();
+  const PlanProblem problem = SealProblem(true);
+  ASSERT_OK_AND_ASSIGN(const v1::Mesh mesh,
+                       client->UploadMesh(*problem.mesh, {{kArray, problem.stiffness}}));
+  const auto refused = [&](auto change, const std::string& why) {
+    for (const bool sealed : {true, false}) {
+      SessionRequest request = SessionRequestOf(problem, mesh.name());
+      request.seals_lips = sealed;
+      change(*request.lip_edge);
+      EXPECT_THAT(client->CreateSession(request),
+                  StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("contact seal: " + why)));
+    }
+  };
+  refused([](LipEdge& edge) { edge.pairs.clear(); }, "there are no pairs");
+  refused([](LipEdge& edge) { edge.up *= 2; }, "\"up\" has length 2");
+  refused([](LipEdge& edge) { edge.up.x() = std::nan(""); }, "\"up\" has length nan");
+  refused([](LipEdge& edge) { edge.pairs[1].upper = -1; }, "pair 1 names vertex -1");
+  refused([](LipEdge& edge) { edge.pairs[2] = edge.pairs[0]; }, "pair 2 names vertex");
+  SessionRequest request = SessionRequestOf(problem, mesh.name());
+  request.model = DeformationModel::kNeoHookean;
+  EXPECT_THAT(client->CreateSession(request),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("neo_hookean does not compute the lip seal")));
+  request = SessionRequestOf(problem, mesh.name());
+  request.contact.clear();
+  EXPECT_THAT(client->CreateSession(request),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("has no contact row")));
+}
+
 TEST_F(ContactSessionsTest, BadRowsAreRefusedByTheirIndex) {
   const auto client = Connect();
   const PlanProblem problem = Problem(block_.rows);
@@ -255,7 +343,7 @@ TEST_F(ContactSessionsTest, BadRowsAreRefusedByTheirIndex) {
 TEST_F(ContactSessionsTest, ARestoredSessionShowsTheSameFrames) {
   DurableServer durable("contact", {"--log-level", "warn"});
   ASSERT_THAT(durable.Start(), IsOk());
-  const PlanProblem problem = Problem(block_.rows);
+  const PlanProblem problem = SealProblem(true);
   v1::Session session;
   std::vector<std::string> before;
   {
@@ -269,6 +357,7 @@ TEST_F(ContactSessionsTest, ARestoredSessionShowsTheSameFrames) {
   ASSERT_OK_AND_ASSIGN(const v1::Session stored, client->GetSession(session.name()));
   EXPECT_EQ(stored.etag(), session.etag());
   EXPECT_EQ(stored.contact_row_count(), session.contact_row_count());
+  EXPECT_EQ(stored.sealed_pair_count(), 3);
   EXPECT_EQ(Drag(client.get(), session), before);
 }
 

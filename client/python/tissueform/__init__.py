@@ -41,13 +41,13 @@ from .poses import Pose, ras_to_lps  # noqa: E402
 from .predictions import Frame, MaterialRanges, Prediction, Prepared  # noqa: E402
 from .prepared_answers import PreparedAnswers  # noqa: E402
 from .sample_meshes import sample_bar  # noqa: E402
-from .sessions import FIXED_BONE, ContactRow, Session  # noqa: E402
+from .sessions import FIXED_BONE, ContactRow, LipEdge, Session  # noqa: E402
 from .stored_predictions import Export, Measure, StoredPrediction  # noqa: E402
 from .volumes import Volume  # noqa: E402
 
 __all__ = [
     "AccessDenied", "AsyncDrag", "BuiltPlan", "Cancelled", "Client", "Conflict", "ContactRow", "DataDamaged", "DeadlineExceeded",
-    "DoctorLine", "Drag", "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded",
+    "DoctorLine", "Drag", "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded", "LipEdge",
     "LocalServer", "MaterialRanges", "Measure", "Mesh", "NotFound", "Plan", "Pose", "Prediction", "Prepared", "PreparedAnswers",
     "ServerError", "ServerInfo", "ServerUnavailable", "Session", "StoredPrediction", "Tls", "TissueformError", "Unauthenticated", "Volume",
     "boundary_triangles", "connect", "doctor", "from_meshio", "local", "outcome", "outcome_cohort", "ras_to_lps", "read_plan", "sample_bar",

@@ -167,8 +167,27 @@ class AnswerEvaluator:
         if rows == 0:
             return np.zeros((0, 1)), 0.0
         q = self.file.section(50) + self.file.section(51).reshape(rows, -1) @ coefficients[:, 0]
-        forces, residual = contact_forces(q, self.file.section(52).reshape(rows, rows))
+        compliance = self.file.section(52).reshape(rows, rows)
+        forces, residual = contact_forces(q, compliance)
+        if forces is not None and len(self.file.section(58)) > 0:
+            forces, of_seal = self._sealed(coefficients[:, 0], q, compliance, forces)
+            residual += of_seal
         return None if forces is None else forces[:, None], residual
+
+    def _sealed(self, a: Array, q: Array, compliance: Array, free: Array) -> Tuple[Optional[Array], float]:
+        """Forces of contact and of the seal (docs/prepared-answers.md), from those of free lips."""
+        upper_map, upper_forces, lower_map, lower_forces = (self.file.seal_matrix(number) for number in (53, 54, 55, 56))
+        stiffness = self.file.seal_matrix(57)
+        heights = upper_map @ a + upper_forces @ free
+        unforced = lower_map @ a
+        if not np.abs(heights - unforced - lower_forces @ free).max() <= self.file.section(58)[0]:
+            return np.concatenate([free, np.zeros(len(heights))]), 0.0
+        across = lower_forces.T @ stiffness
+        shrunk = across @ lower_forces
+        forces, residual = contact_forces(q + across @ (heights - unforced), compliance - (shrunk + shrunk.T) / 2)
+        if forces is None:
+            return None, 0.0
+        return np.concatenate([forces, stiffness @ (heights - unforced) - across.T @ forces]), residual
 
     def _pairs(self, poses: Sequence[HandlePose]) -> Tuple[Array, Array]:
         numbers: List[float] = []

@@ -31,7 +31,7 @@ def read_sections(data: bytes) -> Dict[int, Array]:
     """The sections by their numbers, without a copy. Raises ValueError unless each is within the bytes, aligned and finite."""
     _require(16 <= len(data) <= MAX_BYTES, "too short or too long")
     magic, version, count = struct.unpack_from("<8sII", data, 0)
-    _require(magic == b"TFANSWER" and version in (1, 2, 3), "not version 1 to 3")
+    _require(magic == b"TFANSWER" and version in (1, 2, 3, 4), "not version 1 to 4")
     _require(count <= 64 and 16 + 16 * count <= len(data), "the table of sections is cut off")
     sections: Dict[int, Array] = {}
     for i in range(count):
@@ -92,6 +92,19 @@ class AnswerFile:
             _require(int((regions == region).sum()) == len(places), "rest positions that do not fit the regions")
         _require(int((regions >= 0).sum()) == len(self.held), "rest positions that do not fit the regions")
         _require(len(self.section(50)) <= MAX_CONTACT_ROWS, "too many rows of contact")
+        pairs, rows = self.seal_pairs, len(self.section(50))
+        for number, width in ((53, 12 * self.handles), (54, rows), (55, 12 * self.handles), (56, rows), (57, pairs)):
+            _require(len(self.section(number)) == pairs * width, "a lip seal of other sizes")
+        _require(len(self.section(58)) == (1 if pairs > 0 else 0) and pairs <= rows, "a lip seal of other sizes")
+
+    @property
+    def seal_pairs(self) -> int:
+        """Pairs of lip vertices that are held together; 0 without a seal."""
+        return len(self.section(53)) // (12 * self.handles)
+
+    def seal_matrix(self, number: int) -> Array:
+        """#pairs rows."""
+        return self.section(number, len(self.section(number)) // self.seal_pairs)
 
     def _check_clusters(self) -> None:
         order = self.section(34)

@@ -17,7 +17,7 @@ from .errors import WHERE_IS_IT, DeadlineExceeded, ServerUnavailable, error_of_c
 from ._uploads import Progress
 from .meshes import Mesh, MeshCalls, mesh_of, upload
 from .plan_builds import BuiltPlan, PlanBuildCalls, RecipeLike, VolumeLike
-from .sessions import ContactRow, Session, StageProgress, Stiffness, create_session
+from .sessions import ContactRow, LipEdge, Session, StageProgress, Stiffness, create_session
 from .stored_predictions import ExportCalls, PredictionCalls, StoredPrediction
 from .v1 import server_info_pb2, server_info_pb2_grpc, session_service_pb2, session_service_pb2_grpc
 
@@ -103,17 +103,18 @@ class Client:
 
     def create_session(self, mesh: Mesh, *, handles: Mapping[str, Any], fixed: Any = (), stiffness: Optional[Stiffness] = None,
                        model: str = "gradient_field", poisson_ratio: Optional[float] = None, contact: Sequence[ContactRow] = (),
-                       project: str = "", on_progress: Optional[StageProgress] = None) -> Session:
+                       lip_edge: Optional[LipEdge] = None, project: str = "", on_progress: Optional[StageProgress] = None) -> Session:
         """Prepares a session: regions are fixed, the matrix is factorized. Takes seconds for 100,000 vertices. Ctrl-C leaves nothing behind.
 
         handles: vertices that move together, by name; fixed: vertices that stay; each as numbers from 0, (#,), or as a mask, (#V,) bool.
         stiffness: in Pa, or the name of a cell array; the mesh's own if None. model: "gradient_field", "arap", "linear_elastic" or
         "neo_hookean". poisson_ratio: 0 to below 0.5, of the elastic models. contact: rows by which tissue slides and lifts off (elastic
-        models). project: whoever the caller shares the project with may use the session. on_progress: called with stage, step and steps.
+        models). lip_edge: lips that stay closed, with contact only. project: whoever the caller shares the project with may use the session.
+        on_progress: called with stage, step and steps.
 
         Errors: InvalidInput, NotFound (the mesh), LimitExceeded (memory, sessions), Conflict (NOT_POSITIVE_DEFINITE), ServerUnavailable.
         """
-        return create_session(self._caller, mesh, handles, fixed, stiffness, model, poisson_ratio, contact, project, on_progress)
+        return create_session(self._caller, mesh, handles, fixed, stiffness, model, poisson_ratio, contact, lip_edge, project, on_progress)
 
     def session(self, name: str) -> Session:
         """Errors: NotFound."""

@@ -18,7 +18,7 @@ from .client import Client
 from .errors import InvalidInput, NotFound
 from .meshes import Points, Tets, check_points, check_tets
 from .poses import Pose
-from .sessions import FIXED_BONE, ContactRow, Session
+from .sessions import FIXED_BONE, ContactRow, LipEdge, Session
 
 Arrays = Mapping[str, npt.NDArray[Any]]
 
@@ -27,7 +27,7 @@ Arrays = Mapping[str, npt.NDArray[Any]]
 class Plan:
     """Made by read_plan. points: (#V, 3) in mm. tets: (#T, 4). stiffness: in Pa, one number or (#T,). fixed, handles: masks, (#V,) bool;
     vertices of contact rows are in none of them. poses: those of the plan, by handle. point_data, cell_data: arrays of the mesh by name.
-    coordinate_system: "LPS" or "RAS", of points and poses."""
+    lip_edge: what `create_session(seal=True)` holds together, or None. coordinate_system: "LPS" or "RAS", of points and poses."""
 
     points: Points
     tets: Tets
@@ -36,20 +36,25 @@ class Plan:
     handles: Dict[str, npt.NDArray[np.bool_]]
     poses: Dict[str, Pose]
     contact: List[ContactRow]
+    lip_edge: Optional[LipEdge]
     model: str
     poisson_ratio: Optional[float]
     coordinate_system: str
     point_data: Arrays
     cell_data: Arrays
 
-    def create_session(self, client: Client, *, model: Optional[str] = None, **options: Any) -> Session:
-        """Uploads the mesh and prepares a session of this plan. model: another than the plan's. options: those of Client.create_session.
+    def create_session(self, client: Client, *, model: Optional[str] = None, seal: bool = False, **options: Any) -> Session:
+        """Uploads the mesh and prepares a session of this plan. model: another than the plan's. seal: closed lips stay closed
+        (linear_elastic only). options: those of Client.create_session.
 
         Errors: those of Client.upload_mesh and Client.create_session.
         """
+        if seal and self.lip_edge is None:
+            raise InvalidInput("the plan has no lips to seal", advice='build it with "lips": {"part": true}, from a CT with closed lips')
+        lip_edge = None if self.lip_edge is None else dataclasses.replace(self.lip_edge, sealed=seal)
         mesh = client.upload_mesh(self.points, self.tets, self.stiffness)
         return client.create_session(mesh, handles=self.handles, fixed=self.fixed, model=model or self.model,
-                                     poisson_ratio=self.poisson_ratio, contact=self.contact, **options)
+                                     poisson_ratio=self.poisson_ratio, contact=self.contact, lip_edge=lip_edge, **options)
 
 
 def read_plan(path: PathLike) -> Plan:
@@ -86,6 +91,7 @@ def _plan_of(plan: Any, file: pathlib.Path) -> Plan:
     return Plan(points=points, tets=tets, stiffness=_stiffness(plan["stiffness"], cell_data),
                 fixed=_selected(plan["fixed"], points, point_data) & ~free, handles=handles,
                 poses={handle["name"]: _pose(handle.get("pose", {})) for handle in plan["handles"]}, contact=contact,
+                lip_edge=_lip_edge(plan.get("contact", {}).get("seal")),
                 model=plan.get("model", "gradient_field"), poisson_ratio=plan.get("poisson_ratio"),
                 coordinate_system=plan["coordinate_system"], point_data=point_data, cell_data=cell_data)
 
@@ -185,6 +191,10 @@ def _pose(pose: Any) -> Pose:
     zero = (0.0, 0.0, 0.0)
     turn = [math.radians(angle) for angle in pose.get("rotation_vector_deg", zero)]
     return Pose(tuple(pose.get("translation_mm", zero)), tuple(turn), tuple(pose.get("pivot_mm", zero)), pose.get("scale", 1.0))
+
+
+def _lip_edge(seal: Any) -> Optional[LipEdge]:
+    return None if seal is None else LipEdge(tuple(seal["up"]), [(int(upper), int(lower)) for upper, lower in seal["pairs"]], sealed=False)
 
 
 def _contact_row(row: Any) -> ContactRow:

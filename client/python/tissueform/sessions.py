@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Type, Union
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Type, Union
 
 from ._calls import Caller, new_id
 from .async_drag import AsyncDrag
@@ -36,6 +36,24 @@ class ContactRow:
     normal: Vector
     gap_mm: float = 0.0
     bilateral: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class LipEdge:
+    """The front edge of two parted lips that touch at rest. up: from the lower lip to the upper one, (3,), length 1. pairs: an upper and a
+    lower vertex each, at the same place at rest and with a contact row between them. sealed: the lower edge follows the upper one, until
+    they are parted too far; linear_elastic only (docs/lips.md)."""
+
+    up: Vector
+    pairs: Sequence[Tuple[int, int]]
+    sealed: bool = True
+
+
+def _lip_edge_to_proto(edge: Optional[LipEdge]) -> Optional[session_pb2.LipEdge]:
+    if edge is None:
+        return None
+    pairs = [session_pb2.LipEdge.Pair(upper=upper, lower=lower) for upper, lower in edge.pairs]
+    return session_pb2.LipEdge(up=vector_to_proto(edge.up, "up of the lip edge"), pairs=pairs, sealed=edge.sealed)
 
 
 def _contact_to_proto(row: ContactRow, index: int) -> session_pb2.ContactRow:
@@ -174,13 +192,14 @@ class Session:
 
     def update(self, *, stiffness: Optional[Stiffness] = None, model: Optional[str] = None, poisson_ratio: Optional[float] = None,
                fixed: Any = None, handles: Optional[Mapping[str, Any]] = None, contact: Sequence[ContactRow] = (),
-               on_progress: Optional[StageProgress] = None) -> None:
-        """Prepares the session again with these changes; what is left out stays. fixed, handles and contact replace all regions together.
+               lip_edge: Optional[LipEdge] = None, on_progress: Optional[StageProgress] = None) -> None:
+        """Prepares the session again with these changes; what is left out stays. fixed, handles, contact and lip_edge replace all regions
+        together.
 
         Errors: those of Client.create_session; Conflict (STALE_ETAG: somebody else has changed it since the last refresh).
         """
-        if handles is None and (fixed is not None or contact):
-            raise InvalidInput("regions are replaced together", advice="give handles with fixed and contact")
+        if handles is None and (fixed is not None or contact or lip_edge is not None):
+            raise InvalidInput("regions are replaced together", advice="give handles with fixed, contact and lip_edge")
         request = session_service_pb2.UpdateSessionRequest(name=self.name, etag=self.description.etag, model=model_to_proto(model),
                                                            poisson_ratio=poisson_ratio)
         if stiffness is not None:
@@ -189,7 +208,8 @@ class Session:
             request.regions.CopyFrom(session_service_pb2.SessionRegions(
                 fixed_vertices=indices_of([] if fixed is None else fixed, "fixed vertices", self._vertex_count).tolist(),
                 handles=_handles_to_proto(handles, self._vertex_count),
-                contact=[_contact_to_proto(row, index) for index, row in enumerate(contact)]))
+                contact=[_contact_to_proto(row, index) for index, row in enumerate(contact)],
+                lip_edge=_lip_edge_to_proto(lip_edge)))
         whole = session_service_pb2.PrepareSessionRequest(update=request)
         self.description = prepare(self._caller, self._sessions, whole, self.name, on_progress, repeat_if_lost=False)
 
@@ -220,14 +240,15 @@ def prepare(caller: Caller, stub: Any, request: session_service_pb2.PrepareSessi
 
 
 def create_session(caller: Caller, mesh: Mesh, handles: Mapping[str, Any], fixed: Any, stiffness: Optional[Stiffness], model: str,
-                   poisson_ratio: Optional[float], contact: Sequence[ContactRow], project: str, on_progress: Optional[StageProgress]) -> Session:
+                   poisson_ratio: Optional[float], contact: Sequence[ContactRow], lip_edge: Optional[LipEdge], project: str,
+                   on_progress: Optional[StageProgress]) -> Session:
     """See Client.create_session."""
     request = session_service_pb2.CreateSessionRequest(
         mesh=mesh.name, stiffness=_stiffness_to_proto(mesh.stiffness if stiffness is None else stiffness),
         fixed_vertices=indices_of(fixed, "fixed vertices", mesh.vertex_count).tolist(),
         handles=_handles_to_proto(handles, mesh.vertex_count), model=model_to_proto(model),
-        poisson_ratio=poisson_ratio, contact=[_contact_to_proto(row, index) for index, row in enumerate(contact)], project=project,
-        request_id=new_id())
+        poisson_ratio=poisson_ratio, contact=[_contact_to_proto(row, index) for index, row in enumerate(contact)],
+        lip_edge=_lip_edge_to_proto(lip_edge), project=project, request_id=new_id())
     stub = caller.stub(session_service_pb2_grpc.SessionServiceStub)
     whole = session_service_pb2.PrepareSessionRequest(create=request)
     try:

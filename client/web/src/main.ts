@@ -12,7 +12,7 @@ import { Code, messageOf, toCallError } from "./calls/call_error";
 import { Gateway, baseOf } from "./calls/gateway";
 import { type CaseFile, openCase } from "./case/case_file";
 import { serverSource } from "./case/case_sources";
-import { stickingCase } from "./case/sticking_case";
+import { type ContactChoice, contactChoiceOf, contactSuffix, sealedCase, toContactChoice } from "./case/contact_choice";
 import type { ModelInfo } from "./generated/tissueform/v1/server_info_pb";
 import { isLinkToken } from "./live/follow_links";
 import type { Login } from "./login/login";
@@ -33,6 +33,7 @@ import type { Workbench } from "./workbench/workbench";
 //   nothing                            the list of cases
 //   #case={sha256}                     the planner of a case
 //   #case={sha256}&contact=off         the same, where tissue sticks and lips are one piece; so with followers
+//   #case={sha256}&contact=sealed      the same, where closed lips stay closed
 //   #new                               a new plan from a CT
 //   #new&draft={id}                    the same, of a CT that waits on the server
 //   #follow={session}&case={sha256}    read-only, follows another user's plan; where the server has logins, the link's token
@@ -83,9 +84,9 @@ async function signIn(): Promise<boolean> {
   return user.state.kind === "in";
 }
 
-function parameters(): { caseId: string; follow: string; sticks: boolean; isNew: boolean; draftId: string } {
+function parameters(): { caseId: string; follow: string; contact: ContactChoice; isNew: boolean; draftId: string } {
   const all = new URLSearchParams(location.hash.slice(1));
-  return { caseId: all.get("case") ?? "", follow: all.get("follow") ?? "", sticks: all.get("contact") === "off", isNew: all.has("new"), draftId: all.get("draft") ?? "" };
+  return { caseId: all.get("case") ?? "", follow: all.get("follow") ?? "", contact: toContactChoice(all.get("contact")), isNew: all.has("new"), draftId: all.get("draft") ?? "" };
 }
 
 async function route(): Promise<void> {
@@ -129,12 +130,12 @@ function go(caseId: string): void {
 async function openPlanner(name: string): Promise<void> {
   const [file, models, hasLogins] = await Promise.all([fetchCase(name), fetchModels(), knowsCallers()]);
   const caseId = name.replace("cases/", "");
-  const suffix = file.parted === null ? "" : "&contact=off";
-  const followUrl = (follow: string) => `${base}/#follow=${follow}&case=${caseId}${suffix}`;
-  const chooseContact = async (sticks: boolean) => {
+  const addressed = (choice: ContactChoice) => (choice === "on" ? "" : `&${contactSuffix(choice)}`);
+  const followUrl = (follow: string) => `${base}/#follow=${follow}&case=${caseId}${addressed(contactChoiceOf(file))}`;
+  const chooseContact = async (choice: ContactChoice) => {
     carryWork(bench);
     await bench.live.end();
-    location.hash = `case=${caseId}${sticks ? "&contact=off" : ""}`;
+    location.hash = `case=${caseId}${addressed(choice)}`;
   };
   const parts = { followUrl, hasLogins, account: account(), chooseContact };
   const { element, bench } = plannerPage(gateway, file, name, models, parts, () => (location.hash = ""));
@@ -186,8 +187,15 @@ async function fetchCase(name: string): Promise<CaseFile> {
     told.textContent = formatProgress(done, total);
   };
   const file = await openCase(serverSource(gateway, entry), onProgress);
-  // A case that has no contact sticks anyway.
-  return parameters().sticks && file.sessionRequest.contact.length > 0 ? stickingCase(file) : file;
+  return withContact(file, parameters().contact);
+}
+
+/** One that has no contact sticks anyway. */
+async function withContact(file: CaseFile, choice: ContactChoice): Promise<CaseFile> {
+  if (choice === "sealed") return sealedCase(file);
+  if (choice === "on" || file.sessionRequest.contact.length === 0) return file;
+  const { stickingCase } = await pagePart(() => import("./case/sticking_case"));
+  return stickingCase(file);
 }
 
 async function fetchModels(): Promise<readonly ModelInfo[]> {

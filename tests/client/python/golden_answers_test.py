@@ -10,7 +10,7 @@ from tissueform import DataDamaged, PreparedAnswers
 from tissueform.answer_evaluator import AnswerEvaluator, HandlePose, contact_forces
 
 FOLDER = "tests/data/prepared_answers"
-NAMES = ("gradient_field", "linear_elastic", "linear_elastic_band", "linear_elastic_contact", "neo_hookean", "neo_hookean_third_order")
+NAMES = ("gradient_field", "linear_elastic", "linear_elastic_band", "linear_elastic_contact", "linear_elastic_seal", "neo_hookean", "neo_hookean_third_order")
 AGREEMENT_MM = 1e-4
 BAND_AGREEMENT_MM = 2e-3
 

@@ -2,13 +2,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { type MessageInitShape, create } from "@bufbuild/protobuf";
-import type { ContactRow } from "../generated/tissueform/v1/session_pb";
 import { type CreateSessionRequest, CreateSessionRequestSchema } from "../generated/tissueform/v1/session_service_pb";
 import type { CaseFile, CaseSource } from "./case_file";
 import { CaseError } from "./field";
 import type { Manifest } from "./manifest";
 import { subtleCrypto } from "./secure_page";
-import { withSticking } from "./sticking";
+import { firstAtPlace, keptCount, withSticking } from "./sticking";
 
 /**
  * The same case without contact, as `--contact off` makes it: tissue sticks to bone, and the lips are one piece. Its mesh is another
@@ -33,27 +32,6 @@ export async function stickingCase(file: CaseFile): Promise<CaseFile> {
     sticking: new Int32Array(),
     parted: file,
   };
-}
-
-/** For every vertex the first one at its place that rows join it with: itself unless it is a double. `positions`: #V by 3. */
-export function firstAtPlace(positions: ArrayLike<number>, rows: readonly ContactRow[]): Int32Array {
-  const first = Int32Array.from({ length: positions.length / 3 }, (_, vertex) => vertex);
-  for (const { vertex, other } of rows) {
-    if (other.case !== "otherVertex") continue;
-    const [earlier, later] = [Math.min(vertex, other.value), Math.max(vertex, other.value)];
-    if (![0, 1, 2].every((axis) => positions[3 * earlier + axis] === positions[3 * later + axis])) continue;
-    first[later] = Math.min(first[later], earlier);
-  }
-  // An earlier vertex is settled before those that are joined with it.
-  first.forEach((vertex, i) => (first[i] = first[vertex]));
-  return first;
-}
-
-/** How many vertices are left where the doubles, which come last, are gone. */
-export function keptCount(first: Int32Array): number {
-  let kept = first.length;
-  while (kept > 0 && first[kept - 1] !== kept - 1) --kept;
-  return kept;
 }
 
 /** The mesh's bytes (docs/case-format.md) without the doubles. */
@@ -86,6 +64,7 @@ function stickingRequest(request: CreateSessionRequest, sticking: Int32Array, me
     ...request,
     mesh,
     contact: [],
+    lipEdge: undefined,
     fixedVertices: withSticking(request.fixedVertices, sticking, -1),
     handles: request.handles.map((handle, index) => ({ ...handle, vertices: withSticking(handle.vertices, sticking, index) })),
   };

@@ -27,10 +27,13 @@ export interface EvaluatorExports {
   band_mm(): number;
   evaluate_contact(): number;
   contact_forces(): number;
+  seal_pairs(): number;
+  seal_parted_mm(): number;
+  seal_released(): number;
 }
 
-/** Of other poses than those of the hand: of every vertex its place or the band in mm, or of every contact row that may lift off the force in N. */
-export type ValueKind = "positions" | "band" | "contact";
+/** Of other poses than those of the hand: of every vertex its place or the band in mm, of every contact row that may lift off the force in N, or of sealed lips how far they are parted in mm before and whether (1) that is too far for a seal. */
+export type ValueKind = "positions" | "band" | "contact" | "seal";
 
 /** One Pa mm², in N. */
 const FORCE_UNIT_N = 1e-6;
@@ -119,6 +122,7 @@ export class AnswerEvaluator {
   valuesAt(poses: readonly Pose[], kind: ValueKind): Float32Array | null {
     if (!this.setPoses(poses)) return null;
     if (kind === "positions") return this.places();
+    if (kind === "seal") return this.seal();
     return kind === "band" ? (this.band()?.slice() ?? null) : this.contactForces();
   }
 
@@ -148,6 +152,11 @@ export class AnswerEvaluator {
     const rows = this.exports.evaluate_contact();
     if (rows === 0) return null;
     return Float32Array.from(new Float64Array(this.exports.memory.buffer, this.exports.contact_forces(), rows), (force) => FORCE_UNIT_N * force);
+  }
+
+  private seal(): Float32Array | null {
+    this.exports.evaluate_contact();
+    return this.exports.seal_pairs() === 0 ? null : Float32Array.of(this.exports.seal_parted_mm(), this.exports.seal_released());
   }
 
   /** The memory may grow at any call, which detaches its old arrays: so callers get a copy. */

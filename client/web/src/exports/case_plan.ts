@@ -3,7 +3,7 @@
 
 import type { CaseFile } from "../case/case_file";
 import { withSticking } from "../case/sticking";
-import { BlendMap, type ContactRow, type GradientFieldSettings, Guidance, RotationMode } from "../generated/tissueform/v1/session_pb";
+import { BlendMap, type ContactRow, type GradientFieldSettings, Guidance, type LipEdge, RotationMode } from "../generated/tissueform/v1/session_pb";
 import type { Pose } from "../geometry/pose";
 
 // A case as a plan (docs/plan-format.md). The case itself is the plan's mesh, and regions are numbers of its vertices.
@@ -35,11 +35,15 @@ export function planOf(shown: CaseFile, poses: ReadonlyMap<string, Pose>, model:
     poisson_ratio: request.poissonRatio,
     fixed: { vertices: withSticking(request.fixedVertices, sticking, -1) },
     handles: request.handles.map(({ name, vertices }, index) => ({ name, region: { vertices: withSticking(vertices, sticking, index) }, pose: poseJson(poses.get(name)) })),
-    ...(hasContact ? { contact: { rows: request.contact.map(rowJson) } } : {}),
+    ...(hasContact ? { contact: { rows: request.contact.map(rowJson), ...sealJson(request.lipEdge) } } : {}),
     model,
     gradient_field: gradientFieldJson(request.gradientField),
     ...(ranges === null ? {} : { uncertainty: ranges }),
   };
+}
+
+function sealJson(edge: LipEdge | undefined): object {
+  return edge === undefined ? {} : { seal: { up: [edge.up?.x ?? 0, edge.up?.y ?? 0, edge.up?.z ?? 0], pairs: edge.pairs.map(({ upper, lower }) => [upper, lower]) } };
 }
 
 function rowJson({ vertex, other, normal, gapMm, bilateral }: ContactRow): object {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import * as three from "three";
+import { sealedPairs } from "../case/contact_choice";
 import { headAxes, toMove } from "../geometry/pose";
 import type { MeasureResult } from "../measures/evaluation";
 import type { MovementBand } from "../measures/movement_bands";
@@ -47,6 +48,7 @@ export function provenanceLines(bench: Workbench): string[] {
 /** Nothing for a case that has no contact. */
 function contactLine({ file }: Pick<Workbench, "file">): string[] {
   if (file.parted !== null) return ["contact off: tissue sticks, lips are one piece"];
+  if (sealedPairs(file) > 0) return ["contact: lips part, tissue slides; closed lips stay closed (seal: posture, not mechanics)"];
   return file.sessionRequest.contact.length > 0 ? ["contact: lips part, tissue slides"] : [];
 }
 
@@ -70,6 +72,7 @@ export function planDocument(bench: ToldPlan, atRest: NumbersAtRest, ranges: Pla
   const leftOut = [
     ...(bench.showsPlan ? [] : [`landmarks, measures and answer: ${NOT_THE_PLAN}`]),
     ...(bench.file.parted !== null ? ["contact: the face and its measures are without it; tissueform deform --contact off gives them"] : []),
+    ...(sealedPairs(bench.file) > 0 ? ["contact: the face and its measures are with sealed lips; tissueform deform --seal gives them"] : []),
     ...(materialRanges !== null && ranges === null ? ["uncertainty: the stiffness does not distinguish the tissues of the case"] : []),
   ];
   const document = {

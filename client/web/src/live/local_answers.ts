@@ -116,6 +116,12 @@ export class LocalAnswers {
     return this.host?.valuesAt(poses, "contact") ?? Promise.resolve(null);
   }
 
+  /** Of sealed lips; null where lips are free or the page has no columns that know. */
+  async sealAt(poses: readonly Pose[]): Promise<{ partedMm: number; released: boolean } | null> {
+    const values = await (this.host?.valuesAt(poses, "seal") ?? null);
+    return values && { partedMm: values[0], released: values[1] !== 0 };
+  }
+
   /** The columns that the page answers by, as they travel; null where it has none. */
   get heldColumns(): Uint8Array<ArrayBuffer> | null {
     return this.columns === null ? null : this.columns.bytes.slice();

@@ -3,6 +3,7 @@
 
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
+import { type ContactChoice, modelsOf } from "../case/contact_choice";
 import { FollowLinks } from "../live/follow_links";
 import { button, el, throttleToFrame } from "../panels/dom";
 import { exportPanel } from "../panels/export_panel";
@@ -47,7 +48,7 @@ export interface PageParts {
   hasLogins: boolean;
   account: HTMLElement | null;
   /** Leaves for the same case with tissue that sticks, or with lips that part. */
-  chooseContact(sticks: boolean): Promise<void>;
+  chooseContact(choice: ContactChoice): Promise<void>;
 }
 
 /** The planner of one case. */
@@ -61,7 +62,7 @@ export function plannerPage(
 ): { element: HTMLElement; bench: Workbench } {
   const notice = noticeBox();
   const { element: picture, view } = pictureBox(file, notice.show);
-  const bench = new Workbench(gateway, file, caseName, view, models);
+  const bench = new Workbench(gateway, file, caseName, view, modelsOf(file, models));
   const leave = () => void bench.live.end().then(onLeave);
   const links = new FollowLinks(gateway, hasLogins, caseName, () => bench.live.session, followUrl);
   const title = file.manifest.title === "" ? "Case" : file.manifest.title;

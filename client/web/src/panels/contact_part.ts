@@ -2,29 +2,30 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { messageOf } from "../calls/call_error";
+import { type ContactChoice, canBeSealed, contactChoiceOf, sealedPairs } from "../case/contact_choice";
 import { formatNumber } from "../planning/numbers";
 import type { Signal } from "../workbench/signal";
 import type { Touch } from "../workbench/touch";
 import type { Workbench } from "../workbench/workbench";
 import { button, el, select, throttleToFrame } from "./dom";
 
-const CHOICES = [
-  { value: false, label: "Lips part, tissue slides" },
-  { value: true, label: "Tissue sticks, lips are one piece" },
-];
+const ON = { value: "on", label: "Lips part, tissue slides" } as const;
+const SEALED = { value: "sealed", label: "The same, closed lips stay closed" } as const;
+const OFF = { value: "off", label: "Tissue sticks, lips are one piece" } as const;
 
 /** What the texts of the models say is true where tissue sticks. */
 const NO_BAND = "Where lips part no model has a 95 % interval, and models other than Linear elastic take seconds.";
 
 /** Whether tissue touches or sticks, and how it touches now; nothing for a case that has no contact. */
-export function contactPart(bench: Workbench, choose: (sticks: boolean) => Promise<void>): HTMLElement {
-  const sticks = bench.file.parted !== null;
-  if (!sticks && !bench.touches) return el("span", { attributes: { hidden: "" } });
-  const field = select("Contact", CHOICES, (value) => {
-    if (value !== sticks) choose(value).catch((thrown) => (bench.notice.value = messageOf(thrown)));
+export function contactPart(bench: Workbench, choose: (choice: ContactChoice) => Promise<void>): HTMLElement {
+  const chosen = contactChoiceOf(bench.file);
+  if (chosen === "on" && !bench.touches) return el("span", { attributes: { hidden: "" } });
+  const choices: { value: ContactChoice; label: string }[] = canBeSealed(bench.file.parted ?? bench.file) ? [ON, SEALED, OFF] : [ON, OFF];
+  const field = select("Contact", choices, (value) => {
+    if (value !== chosen) choose(value).catch((thrown) => (bench.notice.value = messageOf(thrown)));
   });
-  field.set(CHOICES, sticks ? 1 : 0);
-  return el("div", {}, [field.element, ...(sticks ? [] : touchPart(bench))]);
+  field.set(choices, choices.findIndex(({ value }) => value === chosen));
+  return el("div", {}, [field.element, ...(chosen === "off" ? [] : touchPart(bench))]);
 }
 
 /** Points where tissue presses, and the same in words. */
@@ -36,7 +37,7 @@ function touchPart(bench: Workbench): HTMLElement[] {
   }, { attributes: { "aria-pressed": "false" } });
   const show = async () => {
     const touch = await bench.touch();
-    const text = describeTouch(touch);
+    const text = describeTouch(touch) + describeSeal(sealedPairs(bench.file), await bench.sealState());
     if (told.textContent !== text) told.textContent = text;
     const isShown = touch !== null && bench.comparison.value === null && bench.bite.value === null && shows.getAttribute("aria-pressed") === "true";
     bench.view.setPoints("contact", isShown ? touch.points : [], isShown ? touch.colors : undefined);
@@ -44,6 +45,14 @@ function touchPart(bench: Workbench): HTMLElement[] {
   const later = throttleToFrame(() => void show());
   for (const signal of [bench.answer, bench.comparison, bench.bite, bench.localState]) (signal as Signal<unknown>).watch(later);
   return [el("div", { class: "buttons" }, [shows]), told, el("p", { class: "quiet", text: NO_BAND })];
+}
+
+/** What became of the seal, with a space before; nothing of free lips. */
+export function describeSeal(pairs: number, state: { partedMm: number; released: boolean } | null): string {
+  if (pairs === 0) return "";
+  if (state === null) return " Closed lips stay closed: posture, not mechanics.";
+  const parted = `${formatNumber(state.partedMm)} mm apart in height`;
+  return state.released ? ` The seal is released: lips would be ${parted}.` : ` Lips are held closed, which would be up to ${parted}: posture, not mechanics.`;
 }
 
 /** How tissue touches, in a sentence or two. */

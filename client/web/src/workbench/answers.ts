@@ -5,7 +5,7 @@ import type { MessageInitShape } from "@bufbuild/protobuf";
 import { toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
-import { firstAtPlace, keptCount } from "../case/sticking_case";
+import { firstAtPlace, keptCount } from "../case/sticking";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import type { FitRequestSchema, FitResponse } from "../generated/tissueform/v1/plan_service_pb";

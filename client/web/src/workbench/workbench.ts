@@ -4,9 +4,11 @@
 import { messageOf } from "../calls/call_error";
 import type { Gateway } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
+import { contactChoiceOf, contactSuffix, sealedPairs } from "../case/contact_choice";
 import type { SurfaceKind } from "../case/manifest";
 import { type Evaluation, LARGEST_BAND_ROTATION } from "../evaluation/answer_evaluator";
 import type { SolveSummary } from "../generated/tissueform/v1/deform_service_pb";
+import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { BoneSolid, type Penetration, PenetrationTest } from "../geometry/penetration";
@@ -57,6 +59,7 @@ export interface Picking {
 
 const SETTLE_MS = 150;
 /** The bridge makes its models from the case, which has the mesh whose lips part. */
+const SEALED_NOT_TO_PACS = "this prediction has sealed lips, and cannot be sent: choose that lips part under Contact, store the prediction there, and send that";
 const NOT_TO_PACS = "this prediction has tissue that sticks, and cannot be sent: choose that lips part under Contact, store the prediction there, and send that";
 
 /**
@@ -128,6 +131,7 @@ export class Workbench implements ShownFace {
     this.stored = new StoredPredictions(this.answers, this.pacs, {
       question: () => ({ session: this.live.session, model: this.model.value, poses: this.plan.poses() }),
       measuresOf: async (prediction) => {
+        if (isSealed(prediction)) throw new Error(SEALED_NOT_TO_PACS);
         if (prediction.mesh !== (file.parted ?? file).manifest.mesh.name) throw new Error(NOT_TO_PACS);
         return storedMeasures({ file, landmarks: this.landmarks, comparer: this.comparer, planned: this.planned, answers: this.planAnswers }, prediction);
       },
@@ -157,8 +161,8 @@ export class Workbench implements ShownFace {
       onState: (state) => (this.localState.value = state),
       onEvaluation: (evaluation) => this.showLocal(evaluation),
     });
-    // A session that sticks is of another mesh: it has a place of its own in what the browser remembers.
-    this.live = new LiveSession(gateway, file, file.parted === null ? caseName : `${caseName}#contact=off`, {
+    // A session with another contact has a place of its own in what the browser remembers.
+    this.live = new LiveSession(gateway, file, rememberedAs(caseName, file), {
       onConnection: (connection) => (this.connection.value = connection),
       onPicture: (picture, used) => this.show(picture, used),
       onCommittedPoses: (poses) => this.plan.setPoses(poses),
@@ -310,6 +314,11 @@ export class Workbench implements ShownFace {
   /** Poses of the bone as it is shown. */
   shownPoses: ReadonlyMap<string, Pose> = new Map();
 
+  /** Of sealed lips; null where they are free or this page does not know. */
+  sealState(): Promise<{ partedMm: number; released: boolean } | null> {
+    return sealedPairs(this.file) === 0 ? Promise.resolve(null) : this.local.sealAt(this.jaw.apply(this.plan.poses()));
+  }
+
   /** Tissue slides and lips part: the case has contact rows, and they count. */
   get touches(): boolean {
     return this.file.sessionRequest.contact.length > 0;
@@ -418,4 +427,13 @@ export class Workbench implements ShownFace {
     this.lay(shape);
     this.setPoses(shape.poses);
   }
+}
+
+function rememberedAs(caseName: string, file: CaseFile): string {
+  const choice = contactChoiceOf(file);
+  return choice === "on" ? caseName : `${caseName}#${contactSuffix(choice)}`;
+}
+
+function isSealed({ summary }: Prediction): boolean {
+  return summary?.seal !== undefined && !summary.seal.released;
 }

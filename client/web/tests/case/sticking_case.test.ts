@@ -3,7 +3,8 @@
 
 import { expect, test } from "vitest";
 import { type CaseFile, openCase } from "../../src/case/case_file";
-import { firstAtPlace, keptCount, stickingCase } from "../../src/case/sticking_case";
+import { firstAtPlace, keptCount } from "../../src/case/sticking";
+import { stickingCase } from "../../src/case/sticking_case";
 import { planOf } from "../../src/exports/case_plan";
 import { handMadeCase } from "../testing/hand_made_case";
 import { sourceOf } from "../testing/small_case";

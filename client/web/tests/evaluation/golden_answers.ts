@@ -9,7 +9,7 @@ import type { Pose } from "../../src/geometry/pose";
 
 const FOLDER = fileURLToPath(new URL("../../../../tests/data/prepared_answers/", import.meta.url));
 
-export const GOLDEN = ["gradient_field", "linear_elastic", "linear_elastic_band", "linear_elastic_contact", "neo_hookean", "neo_hookean_third_order"] as const;
+export const GOLDEN = ["gradient_field", "linear_elastic", "linear_elastic_band", "linear_elastic_contact", "linear_elastic_seal", "neo_hookean", "neo_hookean_third_order"] as const;
 
 export interface GoldenCase {
   poses: Pose[];

@@ -3,7 +3,7 @@
 
 import { createHash } from "node:crypto";
 import { type MessageInitShape, create, toBinary } from "@bufbuild/protobuf";
-import type { ContactRowSchema } from "../../src/generated/tissueform/v1/session_pb";
+import type { ContactRowSchema, LipEdgeSchema } from "../../src/generated/tissueform/v1/session_pb";
 import { CreateSessionRequestSchema } from "../../src/generated/tissueform/v1/session_service_pb";
 import { HAND_MADE_FACE } from "./hand_made_face";
 import { concat, container, layOut } from "./small_case";
@@ -108,6 +108,8 @@ function meshName({ positions, tets }: Block, payload: Uint8Array): string {
 interface Parting {
   mesh: Block;
   rows: MessageInitShape<typeof ContactRowSchema>[];
+  /** Of the seam on the skin, between the corners. */
+  lipEdge: MessageInitShape<typeof LipEdgeSchema>;
   /** Pairs of a vertex and its handle. */
   sticking: Int32Array;
 }
@@ -132,6 +134,7 @@ function parted(whole: Block, jaw: readonly number[]): Parting {
       ...seam.map((vertex, i) => ({ vertex: count + i, other: { case: "otherVertex" as const, value: vertex }, normal: { x: 0, y: 0, z: -1 } })),
       ...sliding.map((vertex) => ({ vertex, other: { case: "handle" as const, value: "mandible" }, normal: { x: 0, y: -1, z: 0 }, bilateral: true })),
     ],
+    lipEdge: { up: { x: 0, y: 0, z: 1 }, pairs: seam.flatMap((vertex, i) => (whole.positions[3 * vertex + 1] === LOW[1] ? [{ upper: vertex, lower: count + i }] : [])) },
     sticking: Int32Array.from(sliding.flatMap((vertex) => [vertex, 0])),
   };
 }
@@ -151,6 +154,7 @@ export function handMadeCase(hasContact = false): Uint8Array<ArrayBuffer> {
     fixedVertices: verticesWhere(mesh, ([, y]) => y === LOW[1] + STEP_MM * COUNTS[1]),
     handles: [{ name: "mandible", vertices: jaw.filter((vertex) => !stuck.has(vertex)) }],
     contact: parting?.rows,
+    lipEdge: parting?.lipEdge,
     model: hasContact ? 3 : 1,
   });
   const face = skin();

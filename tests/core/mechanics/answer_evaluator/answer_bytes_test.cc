@@ -64,7 +64,7 @@ TEST_P(AnswerBytesTest, ErrorsSayWhatIsWrong) {
   EXPECT_EQ(reading.error, AnswerError::kTooLarge);
   EXPECT_THAT(reading.message, HasSubstr("at most"));
   const std::string good = bytes_;
-  for (const uint32_t version : {0U, 4U}) {
+  for (const uint32_t version : {0U, 5U}) {
     Put(8, version);
     reading = ReadAnswers(bytes_);
     EXPECT_EQ(reading.error, AnswerError::kVersion);

@@ -15,11 +15,14 @@
 #include "core/mechanics/answer_evaluator/answer_bytes.h"
 #include "core/mechanics/answer_evaluator/answer_checks.h"
 #include "core/mechanics/answer_evaluator/answer_evaluator.h"
+#include "core/mechanics/deformation/mesh_preparation.h"
+#include "core/mechanics/prepared_answers/create_response.h"
 #include "core/mechanics/uncertainty/band_columns.h"
 #include "tests/core/mechanics/answer_evaluator/evaluated_problem.h"
 #include "tests/core/mechanics/uncertainty/uncertain_bar.h"
 #include "tests/testing/file_bytes.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/parted_block.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
@@ -161,6 +164,76 @@ TEST_P(GoldenAnswersTest, AreWhatIsMadeToday) {
     EXPECT_NEAR(kept.ErrorMm(PosesOf(one["poses"])), error_mm, 1e-9 + 1e-6 * error_mm);
   }
   EXPECT_LT(golden.size() + golden_file.dump().size(), 300000U) << "under 1 MB together";
+}
+
+// Lips that are sealed and, in some cases, released, as the server evaluates them.
+class GoldenSealTest : public ::testing::Test {
+ protected:
+  GoldenSealTest()
+      : preparation_(*MeshPreparation::Create(
+            block_.mesh, Eigen::VectorXd::Constant(block_.mesh.num_tets(), 15000.0),
+            block_.Constraints(), {})) {
+    std::vector<int32_t> vertices;
+    for (int32_t v = 0; v < block_.mesh.num_vertices(); ++v) vertices.push_back(v);
+    const auto response = *CreateResponse(preparation_, vertices,
+                                          {.model = DeformationModel::kLinearElastic,
+                                           .tolerance_mm = kToleranceMm,
+                                           .max_rotation_rad = kMaxRotationRad,
+                                           .seal = block_.Edge()});
+    PortableAnswers answers = response->Describe();
+    answers.seal_release = {kReleaseMm};
+    response_ = std::make_unique<VertexResponse>(std::move(answers), response->num_terms_before());
+  }
+
+  // So small that motions of this small block release the seal.
+  static constexpr double kReleaseMm = 0.56;
+
+  // Rest, four that are sealed, and three that are released.
+  Json MakeCases() const {
+    Json cases = Json::array();
+    for (int number = 0; number < 8; ++number) {
+      HandlePose pose;
+      pose.pivot_mm = {1, 1, 4};
+      pose.rotation_vector = {0.02 * number, -0.01 * number, 0};
+      pose.translation_mm = {0.03 * number, -0.05 * number, 0.1 * number};
+      EXPECT_EQ(response_->TouchForcesAt({pose}).seal_state->released, number >= 5)
+          << response_->TouchForcesAt({pose}).seal_state->parted_mm;
+      FloatPositions positions;
+      EXPECT_TRUE(response_->Answer({pose}, &positions).has_value()) << number;
+      const std::vector<AnswerPose> poses = ToAnswerPoses(std::vector<HandlePose>{pose});
+      Json one = {{"poses", Json::array()}, {"covered", true}};
+      one["poses"].push_back(ToJson(pose));
+      one["error_mm"] = AnswerEvaluator(response_->Describe()).ErrorMm(poses);
+      one["positions_mm"] = Rounded({positions.data(), positions.data() + positions.size()});
+      cases.push_back(std::move(one));
+    }
+    return cases;
+  }
+
+  const testing::PartedBlock block_;
+  std::shared_ptr<MeshPreparation> preparation_;
+  std::unique_ptr<VertexResponse> response_;
+};
+
+TEST_F(GoldenSealTest, IsWhatIsMadeToday) {
+  const Json file = {{"answers", "linear_elastic_seal.bin"}, {"cases", MakeCases()}};
+  WriteGolden("linear_elastic_seal", response_->Describe(), file);
+  AnswerReading reading = ReadAnswers(ReadGolden("linear_elastic_seal", ".bin"));
+  ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
+  const AnswerEvaluator kept(std::move(reading.answers));
+  const Json golden = Json::parse(ReadGolden("linear_elastic_seal", ".json"));
+  for (const Json& cases : {golden["cases"], file["cases"]}) {
+    ASSERT_EQ(cases.size(), 8U);
+    for (const Json& one : cases) {
+      std::vector<float> positions;
+      ASSERT_TRUE(kept.Answer(PosesOf(one["poses"]), &positions));
+      const std::vector<double> expected = one["positions_mm"];
+      ASSERT_EQ(positions.size(), expected.size());
+      for (size_t i = 0; i < expected.size(); ++i) {
+        ASSERT_NEAR(double{positions[i]}, expected[i], kAgreementMm) << i;
+      }
+    }
+  }
 }
 
 // Linear elasticity with columns of the band, beside BandColumns.
