@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """From a mesh to predictions, on a real server."""
 
+import dataclasses
 import sys
 import tempfile
 import threading
@@ -20,11 +21,11 @@ BEND = {"end": Pose(translation_mm=(0, 2, 0), rotation_vector=(0.1, 0, 0), pivot
 
 
 def setUpModule():
-    global server, client, points, mesh
+    global server, client, points, mesh, mesh_tets
     server = start_server()
     client = server.connect()
-    points, tets = sample_bar()
-    mesh = client.upload_mesh(points, tets, stiffness=5000.0)
+    points, mesh_tets = sample_bar()
+    mesh = client.upload_mesh(points, mesh_tets, stiffness=5000.0)
 
 
 def tearDownModule():
@@ -108,6 +109,31 @@ class PreparedAnswersTest(unittest.TestCase):
                 found = answers.evaluate(poses)
                 self.assertLessEqual(np.abs(found.positions - direct.positions).max(), found.summary.error_bound_mm + 1e-4)
                 self.assertGreaterEqual(found.positions[side, 0].min(), -0.02)
+
+    def test_sealed_lips_stay_closed_as_on_the_server(self):
+        lower = np.flatnonzero((points[:, 2] == 20) & (points[:, 1] >= points[:, 1].max() / 2))
+        upper = len(points) + np.arange(len(lower))
+        parted = np.concatenate([points, points[lower]])
+        cut = mesh_tets.copy()
+        above = points[mesh_tets].mean(axis=1)[:, 2] > 20
+        for low, up in zip(lower, upper):
+            cut[above] = np.where(mesh_tets[above] == low, up, cut[above])
+        rows = [ContactRow(int(up), int(low), (0, 0, 1)) for low, up in zip(lower, upper)]
+        front = [(int(up), int(low)) for low, up in zip(lower, upper) if points[low, 1] == points[:, 1].max()]
+        edge = tissueform.LipEdge(up=(0, 0, 1), pairs=front)
+        block = client.upload_mesh(parted, cut, stiffness=5000.0)
+        pull = {"end": Pose(translation_mm=(0, 0.5, 2))}
+        apart = {}
+        for sealed in (False, True):
+            with client.create_session(block, fixed=parted[:, 2] == 0, handles={"end": parted[:, 2] == 40}, model="linear_elastic",
+                                       contact=rows, lip_edge=dataclasses.replace(edge, sealed=sealed)) as session:
+                self.assertEqual(session.description.sealed_pair_count, len(front) if sealed else 0)
+                direct = session.predict(pull)
+                found = session.prepared_answers().evaluate(pull)
+                self.assertLessEqual(np.abs(found.positions - direct.positions).max(), found.summary.error_bound_mm + 1e-4)
+                apart[sealed] = max(abs(direct.positions[up, 2] - direct.positions[low, 2]) for up, low in front)
+        self.assertGreater(apart[False], 1)
+        self.assertLess(apart[True], 0.3 * apart[False])
 
     def test_the_uncertainty_of_the_material_is_that_of_a_drag(self):
         tissues = np.zeros(mesh.tet_count, dtype=int)
