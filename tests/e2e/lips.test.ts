@@ -109,10 +109,10 @@ test("sealed lips stay closed as the command line has them", async () => {
   await page.getByText(/Lips up to (?!0\.0)\d\.\d mm apart\.$/).waitFor();
   expect(await edgesApart(page)).toBeGreaterThan(0.5);
   const reloaded = page.waitForEvent("load");
-  await page.getByLabel("Contact").selectOption({ label: "The same, closed lips stay closed" });
+  await page.getByLabel("Contact").selectOption({ label: "Lips sealed, tissue slides" });
   await reloaded;
   await live(page);
-  await page.getByText(/Lips are held closed, which would be up to \d\.\d mm apart in height: posture, not mechanics\.$/).waitFor();
+  await page.getByText(/A seal holds the edges of the lips, which would be up to \d\.\d mm apart in height, at one height: posture, not mechanics\.$/).waitFor();
   // The lower edge is held where the upper one is while lips are free; then that one moves a little.
   expect(await edgesApart(page)).toBeLessThan(0.1);
   expect(farthest(...(await bothAnswers(page)))).toBeLessThan(MOVING_FILE_MM);

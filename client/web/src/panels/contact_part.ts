@@ -10,7 +10,7 @@ import type { Workbench } from "../workbench/workbench";
 import { button, el, select, throttleToFrame } from "./dom";
 
 const ON = { value: "on", label: "Lips part, tissue slides" } as const;
-const SEALED = { value: "sealed", label: "The same, closed lips stay closed" } as const;
+const SEALED = { value: "sealed", label: "Lips sealed, tissue slides" } as const;
 const OFF = { value: "off", label: "Tissue sticks, lips are one piece" } as const;
 
 /** What the texts of the models say is true where tissue sticks. */
@@ -50,9 +50,9 @@ function touchPart(bench: Workbench): HTMLElement[] {
 /** What became of the seal, with a space before; nothing of free lips. */
 export function describeSeal(pairs: number, state: { partedMm: number; released: boolean } | null): string {
   if (pairs === 0) return "";
-  if (state === null) return " Closed lips stay closed: posture, not mechanics.";
+  if (state === null) return " A seal holds the edges of the lips at one height: posture, not mechanics.";
   const parted = `${formatNumber(state.partedMm)} mm apart in height`;
-  return state.released ? ` The seal is released: lips would be ${parted}.` : ` Lips are held closed, which would be up to ${parted}: posture, not mechanics.`;
+  return state.released ? ` The seal of the lips is released: their edges are ${parted}.` : ` A seal holds the edges of the lips, which would be up to ${parted}, at one height: posture, not mechanics.`;
 }
 
 /** How tissue touches, in a sentence or two. */
