@@ -91,6 +91,9 @@ absl::Status SetRegions(const SessionOptions& options, TissueformClient* client,
   *regions->mutable_fixed_vertices() = std::move(*of_plan.mutable_fixed_vertices());
   *regions->mutable_handles() = std::move(*of_plan.mutable_handles());
   *regions->mutable_contact() = std::move(*of_plan.mutable_contact());
+  if (of_plan.has_lip_edge()) {
+    *regions->mutable_lip_edge() = std::move(*of_plan.mutable_lip_edge());
+  }
   return absl::OkStatus();
 }
 
