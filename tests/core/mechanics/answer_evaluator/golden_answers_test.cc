@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -173,8 +175,8 @@ class GoldenSealTest : public ::testing::Test {
       : preparation_(*MeshPreparation::Create(
             block_.mesh, Eigen::VectorXd::Constant(block_.mesh.num_tets(), 15000.0),
             block_.Constraints(), {})) {
-    std::vector<int32_t> vertices;
-    for (int32_t v = 0; v < block_.mesh.num_vertices(); ++v) vertices.push_back(v);
+    std::vector<int32_t> vertices(static_cast<size_t>(block_.mesh.num_vertices()));
+    std::iota(vertices.begin(), vertices.end(), 0);
     const auto response = *CreateResponse(preparation_, vertices,
                                           {.model = DeformationModel::kLinearElastic,
                                            .tolerance_mm = kToleranceMm,

@@ -7,6 +7,8 @@
 #include <memory>
 #include <numeric>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -14,6 +16,7 @@
 
 #include "core/mechanics/answer_evaluator/answer_bytes.h"
 #include "core/mechanics/answer_evaluator/answer_checks.h"
+#include "core/mechanics/deformation/create_deformer.h"
 #include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
 #include "core/mechanics/prepared_answers/create_response.h"
