@@ -194,7 +194,7 @@ absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> Session::PrepareResponse(
 std::shared_ptr<const ProgressFeed::Follower> Session::Follow(const ResponseRequest& request,
                                                               TellSession tell) const {
   const absl::StatusOr<std::shared_ptr<SharedPreparation>> preparation = OpenPreparation();
-  return preparation.ok() ? (*preparation)->Follow(Sealed(request), std::move(tell)) : nullptr;
+  return preparation.ok() ? (*preparation)->Follow(request, std::move(tell)) : nullptr;
 }
 
 absl::StatusOr<Deformation> Session::Solve(DeformationModel model,

@@ -81,9 +81,9 @@ absl::Status CheckSeal(const std::string& file, const ResolveOptions& options, c
         "or apart in the CT; build it again with \"lips\": {\"part\": true}, or leave --seal out"));
   }
   if (plan.model == DeformationModel::kLinearElastic) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("--seal: the model ", ModelName(plan.model),
-                   " does not compute the lip seal; use --model linear_elastic"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "--seal: the model ", ModelName(plan.model),
+      " does not compute the lip seal; set \"model\" of the plan to \"linear_elastic\""));
 }
 
 void AddSolverThreads(CLI::App* command, const std::string& when, int* threads) {
