@@ -36,12 +36,12 @@ class Plan:
     handles: Dict[str, npt.NDArray[np.bool_]]
     poses: Dict[str, Pose]
     contact: List[ContactRow]
-    lip_edge: Optional[LipEdge]
     model: str
     poisson_ratio: Optional[float]
     coordinate_system: str
     point_data: Arrays
     cell_data: Arrays
+    lip_edge: Optional[LipEdge] = None
 
     def create_session(self, client: Client, *, model: Optional[str] = None, seal: bool = False, **options: Any) -> Session:
         """Uploads the mesh and prepares a session of this plan. model: another than the plan's. seal: closed lips stay closed
