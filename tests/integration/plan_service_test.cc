@@ -21,6 +21,7 @@
 namespace tissueform::testing {
 namespace {
 
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
@@ -77,7 +78,7 @@ class PlanServiceTest : public ServiceTest {
   }
 
   absl::StatusOr<v1::FitResponse> Fit(
-      const v1::FitRequest& request, std::chrono::milliseconds patience = std::chrono::minutes(1)) {
+      const v1::FitRequest& request, std::chrono::microseconds patience = std::chrono::minutes(1)) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + patience);
     v1::FitResponse response;
@@ -224,13 +225,16 @@ TEST_F(PlanServiceTest, BadRequestsAreRefusedInALineThatNamesTheCulprit) {
 }
 
 TEST_F(PlanServiceTest, ACallThatNobodyWaitsForAnyLongerEndsAndLeavesTheSessionAsItWas) {
-  // A fit may be done in time; not so many.
-  constexpr int kMaxFits = 50;
-  absl::Status status;
-  for (int fit = 0; fit < kMaxFits && status.ok(); ++fit) {
-    status = Fit(Wanted(SomePose(1)), std::chrono::milliseconds(1)).status();
+  // One deadline could find every fit already done; ever shorter ones end fits wherever they are.
+  constexpr int kFits = 50;
+  int ended = 0;
+  for (int fit = 0; fit < kFits; ++fit) {
+    const absl::Status status =
+        Fit(Wanted(SomePose(1)), std::chrono::microseconds(1000 / (fit + 1))).status();
+    EXPECT_THAT(status.code(), AnyOf(absl::StatusCode::kOk, absl::StatusCode::kDeadlineExceeded));
+    ended += status.ok() ? 0 : 1;
   }
-  EXPECT_THAT(status, StatusIs(absl::StatusCode::kDeadlineExceeded));
+  EXPECT_GT(ended, 0);
   EXPECT_THAT(Fit(Wanted(SomePose(1))), IsOk());
 }
 
