@@ -28,16 +28,19 @@ constexpr Eigen::Index kMaxReleased = 120;
 absl::Status Prepare(const std::vector<int32_t>& prescribed, int unknowns_per_node,
                      absl::FunctionRef<SparseMatrix()> assemble,
                      std::unique_ptr<ReleasableSystem>* system) {
+  std::vector<int32_t> node_order;
   if (*system != nullptr) {
     const Eigen::Index ever = (*system)->num_released() + (*system)->num_prescribed();
     const auto kept = static_cast<Eigen::Index>(prescribed.size());
     if (ever - kept <= kMaxReleased) return (*system)->KeepOnly(prescribed);
+    node_order = (*system)->node_order();
     system->reset();
   }
   TF_ASSIGN_OR_RETURN(*system, ReleasableSystem::Create(assemble(), prescribed,
                                                         {.backend = CholeskyBackend::kCholmod,
                                                          .admission = {},
-                                                         .unknowns_per_node = unknowns_per_node}));
+                                                         .unknowns_per_node = unknowns_per_node,
+                                                         .node_order = std::move(node_order)}));
   return absl::OkStatus();
 }
 
@@ -88,17 +91,29 @@ absl::StatusOr<std::vector<Positions>> ReleasableModels::GradientField(
       &laplacian_));
   TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd harmonic,
                       laplacian_->Solve({}, HarmonicValues(constraints)));
-  std::vector<Positions> answers;
+  // All sets at once: the time goes into reading the factor.
+  std::vector<HandleTargets> targets;
+  const auto columns = static_cast<Eigen::Index>(3 * pose_sets.size());
+  Eigen::MatrixXd loads = Eigen::MatrixXd::Zero(elements_.num_vertices(), columns);
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(constraints.constrained().size()), columns);
   CellTransforms transforms;
   for (const std::vector<HandlePose>& poses : pose_sets) {
-    const HandleTargets targets = MakeHandleTargets(constraints, elements_.rest, poses);
+    const auto column = static_cast<Eigen::Index>(3 * targets.size());
+    targets.push_back(MakeHandleTargets(constraints, elements_.rest, poses));
     PropagateRotations(elements_, harmonic, poses, threads_, &transforms);
     TransformsToCornerLoads(elements_, stiffness_, threads_, &transforms);
-    const Eigen::MatrixXd loads =
+    // Without rows where nothing turns.
+    const Eigen::MatrixXd of_set =
         GatherCornerLoads(vertex_cells_, elements_.num_vertices(), transforms, threads_);
-    TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements,
-                        laplacian_->Solve(loads, targets.displacements));
-    answers.push_back(ToPositions(constraints, elements_.rest, displacements, targets));
+    if (of_set.rows() > 0) loads.middleCols<3>(column) = of_set;
+    values.middleCols<3>(column) = targets.back().displacements;
+  }
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements, laplacian_->Solve(loads, values));
+  std::vector<Positions> answers;
+  for (size_t i = 0; i < targets.size(); ++i) {
+    answers.push_back(ToPositions(constraints, elements_.rest,
+                                  displacements.middleCols<3>(static_cast<Eigen::Index>(3 * i)),
+                                  targets[i]));
   }
   return answers;
 }
@@ -111,16 +126,20 @@ absl::StatusOr<std::vector<Positions>> ReleasableModels::LinearElastic(
         return ElasticStiffness(elements_, vertex_cells_, stiffness_, poisson_ratio_, threads_);
       },
       &elastic_));
-  std::vector<Positions> answers;
+  std::vector<HandleTargets> targets;
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(3 * constraints.constrained().size()),
+                         static_cast<Eigen::Index>(pose_sets.size()));
   for (const std::vector<HandlePose>& poses : pose_sets) {
-    const HandleTargets targets = MakeHandleTargets(constraints, elements_.rest, poses);
-    TF_ASSIGN_OR_RETURN(
-        const Eigen::MatrixXd displacements,
-        elastic_->Solve({}, Eigen::Map<const Eigen::VectorXd>(targets.displacements.data(),
-                                                              targets.displacements.size())));
-    const Eigen::MatrixXd by_vertex =
-        Eigen::Map<const Positions>(displacements.data(), elements_.num_vertices(), 3);
-    answers.push_back(ToPositions(constraints, elements_.rest, by_vertex, targets));
+    targets.push_back(MakeHandleTargets(constraints, elements_.rest, poses));
+    values.col(static_cast<Eigen::Index>(targets.size()) - 1) = Eigen::Map<const Eigen::VectorXd>(
+        targets.back().displacements.data(), targets.back().displacements.size());
+  }
+  TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd displacements, elastic_->Solve({}, values));
+  std::vector<Positions> answers;
+  for (size_t i = 0; i < targets.size(); ++i) {
+    const Eigen::MatrixXd by_vertex = Eigen::Map<const Positions>(
+        displacements.col(static_cast<Eigen::Index>(i)).data(), elements_.num_vertices(), 3);
+    answers.push_back(ToPositions(constraints, elements_.rest, by_vertex, targets[i]));
   }
   return answers;
 }

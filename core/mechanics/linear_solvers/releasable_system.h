@@ -39,6 +39,8 @@ class ReleasableSystem {
   absl::StatusOr<Eigen::MatrixXd> Solve(const Eigen::MatrixXd& rhs, const Eigen::MatrixXd& values);
 
   Eigen::Index num_prescribed() const { return static_cast<Eigen::Index>(kept_.size()); }
+  // See DirichletSystem::node_order.
+  std::vector<int32_t> node_order() const { return system_->node_order(); }
   Eigen::Index num_released() const { return static_cast<Eigen::Index>(released_.size()); }
 
  private:

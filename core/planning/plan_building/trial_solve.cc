@@ -107,11 +107,13 @@ class TriedModels {
     options.poisson_ratio = trial_->poisson_ratio;
     options.threads = trial_->threads;
     options.mesh_is_usable = true;
+    options.node_order = node_order_;
     TF_ASSIGN_OR_RETURN(
         const auto preparation,
         MeshPreparation::Create(trial_->mesh, stiffness_, constraints, std::move(options)));
     TF_ASSIGN_OR_RETURN(const auto deformer, CreateArapDeformer(preparation, {}));
     TornTets torn(static_cast<size_t>(trial_->mesh.num_tets()), false);
+    node_order_ = preparation->node_order();
     for (const std::vector<HandlePose>& poses : pose_sets_) {
       TF_ASSIGN_OR_RETURN(const Deformation deformation, deformer->Deform(poses));
       Mark(deformation.positions, &torn);
@@ -162,6 +164,8 @@ class TriedModels {
   Eigen::VectorXd stiffness_;
   std::vector<std::vector<HandlePose>> pose_sets_;
   std::unique_ptr<ReleasableModels> quick_;
+  // Of the last mesh preparation, so that only the first looks for one.
+  std::vector<int32_t> node_order_;
 };
 
 // Both models that answer at once in the first round: on one mesh of the bundled head the gradient
