@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
 # Several servers behind one name, on this machine's loopback: PostgreSQL, HAProxy, three tissueform-servers and two
-# gateways; and the run that kills them under load. `deploy/cluster.sh --help` tells more.
+# gateways; and the run that kills them under load. `deploy/cluster.sh --help` shows more.
 #
 #   deploy/cluster.sh up [--nodes N] [--cpus LIST]
 #   deploy/cluster.sh add

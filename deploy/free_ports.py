@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Ports of this machine's loopback for programs that are told theirs."""
+"""Ports of this machine's loopback for programs that receive theirs."""
 
 import random
 import socket

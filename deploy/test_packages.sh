@@ -104,11 +104,11 @@ if [[ ${installed[*]} == *tissueform-pacs* ]]; then
   /usr/bin/python3 -B deploy/pacs/head_series.py "$scratch/series" >/dev/null
   storescu -aet SCANNER -aec TISSUEFORM +sd "${address%:*}" "${address##*:}" "$scratch/series" 2>"$scratch/storescu.log" || fail "the bridge takes no images"
   for ((tries = 0; tries < 600; ++tries)); do
-    told=$(inside runuser -u tissueform-pacs -- tissueform-pacs status --json --config /etc/tissueform/pacs.ini)
-    [[ $told != *'"state": "published"'* ]] || break
+    bridge_status=$(inside runuser -u tissueform-pacs -- tissueform-pacs status --json --config /etc/tissueform/pacs.ini)
+    [[ $bridge_status != *'"state": "published"'* ]] || break
     sleep 0.5
   done
-  [[ $told == *'"state": "published"'* ]] || fail "no case of what was sent: $told"
+  [[ $bridge_status == *'"state": "published"'* ]] || fail "no case of what was sent: $bridge_status"
   ok "what storescu sends to the bridge becomes a case on the server"
 fi
 

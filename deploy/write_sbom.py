@@ -64,7 +64,7 @@ def libraries_of(program):
 def owners_of(libraries):
     """Library: the Debian package that installed it. Its record may name /lib, which is /usr/lib here."""
     names = {name: path for path in libraries for name in (str(path), str(path).removeprefix("/usr"))}
-    # The exit code tells only that one of the two names is unknown, which is always so.
+    # The exit code shows only that one of the two names is unknown, which is always so.
     found = subprocess.run(["dpkg-query", "--search", *names], capture_output=True, text=True).stdout
     owners = {names[line.split(": ")[-1]]: line.split(":")[0] for line in found.splitlines() if line.split(": ")[-1] in names}
     for path in libraries:

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kLastCode = static_cast<int>(grpc::StatusCode::UNAUTHENTICATED);
 
-bool TellsAnotherCode(const google::rpc::Status& details, const grpc::Status& status) {
+bool HasAnotherCode(const google::rpc::Status& details, const grpc::Status& status) {
   return details.code() > 0 && details.code() <= kLastCode && details.code() != status.error_code();
 }
 
@@ -26,7 +26,7 @@ absl::Status FromGrpcStatus(const grpc::Status& status) {
   absl::Status plain(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
   google::rpc::Status details;
   if (status.ok() || !details.ParseFromString(status.error_details())) return plain;
-  if (TellsAnotherCode(details, status)) {
+  if (HasAnotherCode(details, status)) {
     plain = absl::Status(static_cast<absl::StatusCode>(details.code()), details.message());
   }
   for (const google::protobuf::Any& detail : details.details()) {

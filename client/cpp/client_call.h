@@ -12,7 +12,7 @@
 namespace tissueform {
 
 // The same code and message, and the reason that the server gave (ErrorInfoOf in
-// core/base/error_reason.h). Where the details tell another code they count: proxies may end a call
+// core/base/error_reason.h). Where the details have another code, it counts: proxies may end a call
 // in words of their own, but leave the server's details.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 

@@ -95,12 +95,12 @@ std::optional<v1::DeformFrame> DeformStream::Receive() {
     if (response.has_frame()) {
       return std::move(*response.mutable_frame());
     }
-    if (response.has_notice()) Tell(response.notice());
+    if (response.has_notice()) HandleNotice(response.notice());
   }
   return std::nullopt;
 }
 
-void DeformStream::Tell(const v1::DeformNotice& notice) {
+void DeformStream::HandleNotice(const v1::DeformNotice& notice) {
   if (notice.has_draining()) server_is_draining_ = true;
   if (on_notice_) on_notice_(notice);
 }
@@ -111,10 +111,10 @@ void DeformStream::Cancel() {
 }
 
 absl::Status DeformStream::Finish() {
-  // gRPC tells the status of a call only after everything before it was read.
+  // gRPC reports the status of a call only after everything before it was read.
   v1::DeformResponse dropped;
   while (call_->Read(&dropped)) {
-    if (dropped.has_notice()) Tell(dropped.notice());
+    if (dropped.has_notice()) HandleNotice(dropped.notice());
   }
   renewal_.reset();
   finished_ = true;

@@ -99,7 +99,7 @@ class DeformStream {
   std::atomic<bool> server_is_draining_ = false;
   std::atomic<bool> was_cancelled_ = false;
 
-  void Tell(const v1::DeformNotice& notice);
+  void HandleNotice(const v1::DeformNotice& notice);
 
   // Constant after Start.
   std::function<void(const v1::DeformNotice&)> on_notice_;

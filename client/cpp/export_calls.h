@@ -77,7 +77,7 @@ class ExportCalls {
   absl::StatusOr<v1::Export> Update(const v1::UpdateExportRequest& request);
   absl::Status Delete(const std::string& name);
 
-  // The watch has no deadline; the first Receive tells whether it is let.
+  // The watch has no deadline; the first Receive shows whether it is allowed.
   std::unique_ptr<ExportWatchStream> Watch();
 
  private:

@@ -58,7 +58,7 @@ SessionRequest SessionRequestOf(const PlanProblem& problem, const std::string& m
 std::vector<NamedPose> NamedPoses(const PlanProblem& problem);
 
 // Prepared answers with the usual tolerances, and with the plan's ranges of the material where it
-// gives some and its model can tell of them, which it cannot with contact: then frames hold
+// gives some and its model supports them, which it does not with contact: then frames hold
 // uncertainty_p95_mm. REQUIRES: HasPreparedAnswers(problem.deformer, ...).
 v1::PreparedAnswers PreparedAnswersOf(const PlanProblem& problem);
 

@@ -216,7 +216,7 @@ absl::StatusOr<v1::Session> TissueformClient::PrepareSession(
   }
   absl::StatusOr<v1::Session> session =
       WaitForSession(sessions_.get(), sent, {&routes_, name, repeat, Deadline()}, wait);
-  // Version 0.1 does not tell its stages.
+  // Version 0.1 does not report its stages.
   if (absl::IsUnimplemented(session.status()) && request.has_create()) {
     return CreateSession(sent.create(), repeat);
   }

@@ -83,9 +83,9 @@ std::string TokenFile::Current() {
 }
 
 TokenRenewal::TokenRenewal(std::shared_ptr<TokenFile> file, std::string used,
-                           std::function<void(const std::string& token)> tell)
+                           std::function<void(const std::string& token)> on_renewed)
     : file_(std::move(file)),
-      tell_(std::move(tell)),
+      on_renewed_(std::move(on_renewed)),
       used_(std::move(used)),
       thread_([this] { Watch(); }) {}
 
@@ -109,7 +109,7 @@ void TokenRenewal::Watch() {
     }
     std::string token = file_->Current();
     if (token == used_) continue;
-    tell_(token);
+    on_renewed_(token);
     used_ = std::move(token);
   }
 }

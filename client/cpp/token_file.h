@@ -42,12 +42,12 @@ class TokenFile {
   std::string token_ ABSL_GUARDED_BY(mutex_);
 };
 
-// Tells a long call within a second that its file holds another token. `tell` is called on a thread
-// of its own, until it is destroyed.
+// Notifies a long call within a second that its file holds another token. `on_renewed` is called on
+// a thread of its own, until it is destroyed.
 class TokenRenewal {
  public:
   TokenRenewal(std::shared_ptr<TokenFile> file, std::string used,
-               std::function<void(const std::string& token)> tell);
+               std::function<void(const std::string& token)> on_renewed);
   ~TokenRenewal();
   TokenRenewal(const TokenRenewal&) = delete;
   TokenRenewal& operator=(const TokenRenewal&) = delete;
@@ -56,7 +56,7 @@ class TokenRenewal {
   void Watch();
 
   const std::shared_ptr<TokenFile> file_;
-  const std::function<void(const std::string& token)> tell_;
+  const std::function<void(const std::string& token)> on_renewed_;
   std::string used_;  // the thread's
 
   Mutex mutex_;

@@ -93,7 +93,7 @@ absl::StatusOr<std::chrono::nanoseconds> ParseGrpcTimeout(absl::string_view text
 
 std::map<std::string, std::string> AllowedMetadata(
     const std::multimap<grpc::string_ref, grpc::string_ref>& metadata) {
-  std::map<std::string, std::string> told;
+  std::map<std::string, std::string> forwarded;
   size_t bytes = 0;
   for (const auto& [key, data] : metadata) {
     const absl::string_view name(key.data(), key.size());
@@ -101,9 +101,9 @@ std::map<std::string, std::string> AllowedMetadata(
     bytes += name.size() + value.size();
     const bool allowed = absl::StartsWith(name, "x-tissueform-") || name == "traceparent";
     if (!allowed || absl::EndsWith(name, "-bin") || !IsText(value)) continue;
-    if (bytes <= kMaxMetadataBytes) told.emplace(name, value);
+    if (bytes <= kMaxMetadataBytes) forwarded.emplace(name, value);
   }
-  return told;
+  return forwarded;
 }
 
 }  // namespace tissueform

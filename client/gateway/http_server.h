@@ -131,8 +131,8 @@ class HttpServer {
   virtual int port() const = 0;
   // Runs `job` on one of its threads, later.
   virtual void Post(std::function<void()> job) = 0;
-  // Accepts nothing more, tells all connections, waits for them up to the deadline of the limits,
-  // closes those that are left and waits for what had been posted by then. Once.
+  // Accepts nothing more, notifies all connections, waits for them up to the deadline of the
+  // limits, closes those that are left and waits for what had been posted by then. Once.
   virtual void Drain() = 0;
 };
 

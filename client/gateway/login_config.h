@@ -9,8 +9,8 @@
 
 namespace tissueform {
 
-// How the planner's page logs its user in: by OpenID Connect, as a public client. The gateway tells
-// the page so and has no other part in it.
+// How the planner's page logs its user in: by OpenID Connect, as a public client. The gateway
+// passes this to the page and has no other part in it.
 struct LoginConfig {
   std::string issuer = {};  // "https://login.example.org/realms/clinic"; empty: no login
   std::string client_id = {};

@@ -31,8 +31,8 @@ constexpr char kDescription[] =
 
 enum ExitCode : int { kExitDone = 0, kExitFailed = 1 };
 
-// Between two lines of the log that tell what was counted.
-constexpr time_t kTellSeconds = 60;
+// Between two lines of the log that report the counts.
+constexpr time_t kCountsSeconds = 60;
 
 sigset_t TerminationSignals() {
   sigset_t signals;
@@ -44,12 +44,12 @@ sigset_t TerminationSignals() {
 
 void ServeUntilSignal(const tissueform::Gateway& gateway) {
   const sigset_t signals = TerminationSignals();
-  const timespec interval = {kTellSeconds, 0};
-  std::string told;
+  const timespec interval = {kCountsSeconds, 0};
+  std::string logged;
   while (sigtimedwait(&signals, nullptr, &interval) < 0) {
     std::string counts = gateway.counters().Text();
-    if (counts != told) spdlog::info("counts: {}", counts);
-    told = std::move(counts);
+    if (counts != logged) spdlog::info("counts: {}", counts);
+    logged = std::move(counts);
   }
 }
 

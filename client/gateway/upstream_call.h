@@ -45,7 +45,7 @@ class UpstreamUser {
   virtual void OnBegun(std::map<std::string, std::string> headers) = 0;
   // The message that Read asked for.
   virtual void OnAnswer(const grpc::ByteBuffer& message) = 0;
-  // What was written is on its way (or lost: the end tells).
+  // What was written is on its way (or lost: the end reports it).
   virtual void OnWritten() = 0;
   // The last that is called.
   virtual void OnEnd(CallEnd end) = 0;

@@ -30,7 +30,7 @@ class WebCall final : public ReplySource,
         fields_(std::move(fields)),
         client_address_(std::move(client_address)) {}
 
-  // Once. Makes the call, or tells the client why not. `pool` outlives it.
+  // Once. Makes the call, or reports to the client why not. `pool` outlives it.
   void Begin(const HttpHead& head, absl::string_view body, UpstreamPool* pool,
              GatewayCounters* counters);
 

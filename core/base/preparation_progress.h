@@ -28,8 +28,8 @@ struct PreparationProgress {
 // what it refers to must outlive the work. (A Cancellation says whether a caller still waits.)
 using PreparationObserver = std::function<void(const PreparationProgress& progress)>;
 
-inline void TellProgress(const PreparationObserver& observer, PreparationStage stage,
-                         int64_t step = 0, int64_t steps = 0) {
+inline void ReportProgress(const PreparationObserver& observer, PreparationStage stage,
+                           int64_t step = 0, int64_t steps = 0) {
   if (observer) observer({stage, step, steps});
 }
 

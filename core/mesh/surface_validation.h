@@ -40,7 +40,7 @@ struct SurfaceReport {
   bool is_closed() const;
 };
 
-// `split_polygons` is what reading has told (TriangleMeshFile); it is only reported.
+// `split_polygons` is what reading has counted (TriangleMeshFile); it is only reported.
 SurfaceReport ValidateTriangleMesh(const TriangleMesh& mesh, Eigen::Index split_polygons = 0);
 
 // The triangles that count as degenerate_triangles, rising. Those with a corner that is not finite

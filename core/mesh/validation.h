@@ -47,7 +47,7 @@ struct MeshReport {
   const MeshDefect* Find(std::string_view kind) const { return FindDefect(defects, kind); }
 };
 
-// `reoriented_tets` and `left_out_cells` are what reading has told (TetMeshFile); they are only
+// `reoriented_tets` and `left_out_cells` are what reading has counted (TetMeshFile); they are only
 // reported.
 MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets = 0,
                            Eigen::Index left_out_cells = 0);
@@ -56,7 +56,7 @@ MeshReport ValidateTetMesh(const TetMesh& mesh, Eigen::Index reoriented_tets = 0
 // the number of further ones.
 absl::Status CheckUsable(const MeshReport& report);
 
-// The same as CheckUsable(ValidateTetMesh(mesh)) without what the report tells beside errors, in
+// The same as CheckUsable(ValidateTetMesh(mesh)) without what the report states beside errors, in
 // less than half the time.
 absl::Status CheckTetMesh(const TetMesh& mesh);
 

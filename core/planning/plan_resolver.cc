@@ -32,7 +32,7 @@ absl::Status CheckUsable(const std::string& name, const TetMesh& mesh) {
 //
 // What hangs together with no region has no unique answer. The factorisation would find out, too,
 // but know a pivot only; here the message still knows which vertices.
-// Vertices that touch bone by `contact` are free, and told in `freed`.
+// Vertices that touch bone by `contact` are free, and listed in `freed`.
 absl::StatusOr<ConstraintSet> ResolveRegions(const Plan& plan, const TetMeshFile& file,
                                              std::vector<ContactRow> contact,
                                              std::vector<FreedVertex>* freed) {

@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""HAProxy before the servers and the gateways of a cluster: started, asked, and told by its runtime socket."""
+"""HAProxy before the servers and the gateways of a cluster: started, asked, and controlled by its runtime socket."""
 
 import csv
 import io
@@ -39,7 +39,7 @@ def start(cluster):
                            environment=environment(cluster))
 
 
-def tell(cluster, words):
+def send_command(cluster, words):
     """A command for the runtime socket; its answer; None where HAProxy does not run."""
     try:
         with socket.socket(socket.AF_UNIX) as connection:
@@ -56,7 +56,7 @@ def tell(cluster, words):
 
 def view(cluster):
     """What HAProxy thinks of each server and gateway: name to "UP", "DOWN", ...; empty where it does not run."""
-    text = tell(cluster, "show stat")
+    text = send_command(cluster, "show stat")
     if not text:
         return {}
     rows = csv.DictReader(io.StringIO(text.removeprefix("# ")))

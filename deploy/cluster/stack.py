@@ -191,7 +191,7 @@ class Cluster:
         balancer.wait_until_routing(self)
 
     def add(self):
-        """Starts the next server, and tells nobody; its name."""
+        """Starts the next server without notifying the others; its name."""
         self.state["settings"]["nodes"] += 1
         name = self.nodes[-1]
         self.start(name)

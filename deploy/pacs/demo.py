@@ -40,7 +40,7 @@ def value_of(item, tag):
 
 
 def verified(programs, study):
-    """Stores what came back, and tells what dciodvfy says of it."""
+    """Stores what came back; returns what dciodvfy says of it."""
     folder = programs.folder / "back"
     folder.mkdir(exist_ok=True)
     for number, instance in enumerate(programs.instances_of(study)):
@@ -81,38 +81,38 @@ def screenshot(programs, name):
 def run(programs, web):
     began = time.monotonic()
 
-    def tell(text):
+    def report(text):
         print(f"[{time.monotonic() - began:5.1f} s] {text}", flush=True)
 
     programs.start_orthanc()
     programs.start_server()
     programs.start_gateway(web)
     programs.start_bridge()
-    tell("Orthanc, server, gateway and bridge run on loopback, TLS between them")
+    report("Orthanc, server, gateway and bridge run on loopback, TLS between them")
     study, _ = head_series.write_series(programs.folder / "ct")
     sent = programs.store_from_scanner(programs.folder / "ct")
     if sent.returncode != 0:
         raise SystemExit(f"storescu: {sent.stderr}")
-    tell(f"storescu has sent {len(programs.instances_of(study))} slices to Orthanc")
+    report(f"storescu has sent {len(programs.instances_of(study))} slices to Orthanc")
     programs.send_to_bridge(study)
-    tell("Orthanc has sent them to the bridge, which builds the plan")
+    report("Orthanc has sent them to the bridge, which builds the plan")
     case = programs.wait_for("the case", lambda: (programs.cases() or [None])[0], patience_s=300, needs="bridge")
-    tell(f"published: {case}")
+    report(f"published: {case}")
     prediction = programs.predict(case)
-    tell(f"a planner stores {prediction} and sends it to the PACS")
+    report(f"a planner stores {prediction} and sends it to the PACS")
     programs.tissueform("prediction", "send", prediction)
     form = programs.wait_for("the review page's question, with pictures",
                              lambda: "<img" in programs.review() and (programs.forms() or [None])[0], needs="bridge")
-    tell("the review page shows the patient, with pictures, and asks")
+    report("the review page shows the patient, with pictures, and asks")
     screenshot(programs, "review.png")
     programs.confirm(form)
-    tell("confirmed in the review page")
+    report("confirmed in the review page")
     programs.wait_for("the objects", lambda: ": stored" in programs.tissueform("prediction", "send", prediction).stdout
                       or " stored " in programs.tissueform("prediction", "sent").stdout, needs="bridge")
-    tell("stored; QIDO-RS lists the study's series:")
+    report("stored; QIDO-RS lists the study's series:")
     for series in json.loads(curl(programs, f"/studies/{study}/series")):
         print(f"  {value_of(series, '00080060'):3} {value_of(series, '0008103E'):58} {value_of(series, '0020000E')}")
-    tell("the objects, as Orthanc has them, and what dciodvfy says of each:")
+    report("the objects, as Orthanc has them, and what dciodvfy says of each:")
     captured(programs, verified(programs, study))
 
 

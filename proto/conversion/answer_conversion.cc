@@ -24,7 +24,7 @@ v1::GaveUp ToProto(Termination gave_up) {
   return v1::GAVE_UP_UNSPECIFIED;
 }
 
-// Of a reason that this program does not know yet nothing is said: `converged` tells the rest.
+// Of a reason that this program does not know yet nothing is said: `converged` states the rest.
 Termination ToGaveUp(v1::GaveUp gave_up) {
   switch (gave_up) {
     case v1::GAVE_UP_ITERATIONS:

@@ -21,7 +21,7 @@ v1::SolveSummary ToSummaryProto(const Deformation& deformation, DeformationModel
 v1::DeformationQuality ToProto(const DeformationQuality& quality);
 DeformationQuality ToDeformationQuality(const v1::DeformationQuality& quality);
 
-// The fields of `session` that tell of its preparation. bytes_held is that of the whole session.
+// The fields of `session` that describe its preparation. bytes_held is that of the whole session.
 void SetPreparation(const PreparationSummary& preparation, v1::Session* session);
 PreparationSummary ToPreparationSummary(const v1::Session& session);
 

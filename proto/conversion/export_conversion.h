@@ -14,7 +14,7 @@
 
 namespace tissueform {
 
-// What a request may tell of an export.
+// What a request may state about an export.
 inline constexpr int kMaxMeasures = 64;
 inline constexpr int kMaxMeasureNameBytes = 64;
 inline constexpr int kMaxMeasureTitleBytes = 64;
@@ -29,7 +29,7 @@ absl::StatusOr<std::string> ParseExportName(absl::string_view name);
 // number and without their titles.
 absl::Status CheckMeasures(const google::protobuf::RepeatedPtrField<v1::Measure>& measures);
 
-// OK for what a bridge may tell. Errors: InvalidArgument, without it.
+// OK for what a bridge may report. Errors: InvalidArgument, without it.
 absl::Status CheckExportDetail(absl::string_view detail);
 
 // "waiting", "waits for confirmation", "storing", "stored", "failed": for people.

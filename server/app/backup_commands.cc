@@ -38,8 +38,8 @@ absl::StatusOr<BackupSummary> RestoreAll(const ServerOptions& options, const std
   return RestoreBackup(backup, folder);
 }
 
-int Tell(const char* done, const std::string& folder,
-         const absl::StatusOr<BackupSummary>& summary) {
+int PrintResult(const char* done, const std::string& folder,
+                const absl::StatusOr<BackupSummary>& summary) {
   if (!summary.ok()) {
     absl::FPrintF(stderr, "tissueform-server: %s\n", summary.status().message());
     return 1;
@@ -67,9 +67,11 @@ BackupCommands::BackupCommands(CLI::App& app, const ServerOptions* options) : op
 }
 
 std::optional<int> BackupCommands::Run() const {
-  if (verify_->parsed()) return Tell("fine:", folder_, VerifyBackup(folder_));
-  if (backup_->parsed()) return Tell("backed up into", folder_, BackUpAll(*options_, folder_));
-  if (restore_->parsed()) return Tell("restored from", folder_, RestoreAll(*options_, folder_));
+  if (verify_->parsed()) return PrintResult("fine:", folder_, VerifyBackup(folder_));
+  if (backup_->parsed())
+    return PrintResult("backed up into", folder_, BackUpAll(*options_, folder_));
+  if (restore_->parsed())
+    return PrintResult("restored from", folder_, RestoreAll(*options_, folder_));
   return std::nullopt;
 }
 

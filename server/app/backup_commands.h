@@ -20,7 +20,7 @@ class BackupCommands {
   BackupCommands(CLI::App& app, const ServerOptions* options);
 
   // After parsing: runs the command that was given and returns the program's exit code; nothing
-  // when none was. Tells the result on stdout, or what is wrong on stderr, in one line.
+  // when none was. Prints the result on stdout, or what is wrong on stderr, in one line.
   std::optional<int> Run() const;
 
  private:

@@ -39,7 +39,7 @@ absl::StatusOr<std::unique_ptr<PostgresStores>> OpenPatiently(const ClusterOptio
   TF_ASSIGN_OR_RETURN(PostgresOptions database, StoreOptionsOf(cluster));
   database.waited = &WorkerPool::Waited;
   const auto deadline = std::chrono::steady_clock::now() + cluster.start_patience;
-  for (bool told = false;; told = true) {
+  for (bool logged = false;; logged = true) {
     auto stores = PostgresStores::Open({.database = database});
     if (!absl::IsUnavailable(stores.status())) return stores;
     if (std::chrono::steady_clock::now() + kBetweenTries >= deadline) {
@@ -47,7 +47,7 @@ absl::StatusOr<std::unique_ptr<PostgresStores>> OpenPatiently(const ClusterOptio
                                                  cluster.start_patience.count() / 1000,
                                                  " s (--store)"));
     }
-    if (!told) spdlog::warn("the store's database is not reachable yet; waiting");
+    if (!logged) spdlog::warn("the store's database is not reachable yet; waiting");
     std::this_thread::sleep_for(kBetweenTries);
   }
 }

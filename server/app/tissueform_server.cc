@@ -325,9 +325,8 @@ absl::Status TissueformServer::Listen() {
   if (server_ == nullptr) return absl::InternalError("gRPC does not start");
   if (cluster_ != nullptr) {
     // Proxies send calls to servers that can take a session; streams stay while leases last.
-    cluster_->node().nodes().TellReach([health = server_->GetHealthCheckService()](bool reached) {
-      health->SetServingStatus(reached);
-    });
+    cluster_->node().nodes().ObserveReach([health = server_->GetHealthCheckService()](
+                                              bool reached) { health->SetServingStatus(reached); });
   }
   listener_->Start([this](int fd, int listener_fd) {
     grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;

@@ -153,7 +153,7 @@ class TissueformServer {
   Housekeeping housekeeping_;
   DeformStreams streams_;
   SessionWatches watches_;
-  MemoryReclaimer reclaimer_;  // sessions that it evicts tell streams and watches
+  MemoryReclaimer reclaimer_;  // sessions that it evicts notify streams and watches
   DeadlineTimer timer_;
   MeshService mesh_service_;
   SessionService session_service_;

@@ -110,7 +110,7 @@ bool CanDraw() {
 absl::StatusOr<PlanBuildAnswer> Build(const PlanBuildJob& job, const Inputs& inputs,
                                       const PlanBuildLimits& limits, const std::string& folder) {
   PlanBuildCallOptions calling;
-  calling.tell = job.tell;
+  calling.tell = job.on_stage;
   calling.cancel = job.cancel;
   return CallPlanBuild({.ct = inputs.ct,
                         .recipe = inputs.recipe,
@@ -195,7 +195,7 @@ absl::StatusOr<BuiltPlan> BuildStepByStep(const PlanBuildJob& job, const PlanBui
   TF_ASSIGN_OR_RETURN(const Inputs inputs, LinkInputs(job, files));
   TF_ASSIGN_OR_RETURN(AtomicFolder folder, AtomicFolder::Create(job.result_folder));
   TF_ASSIGN_OR_RETURN(PlanBuildAnswer made, Build(job, inputs, limits, folder.path()));
-  job.tell("packing the case", 1);
+  job.on_stage("packing the case", 1);
   TF_ASSIGN_OR_RETURN(const std::string packed, PackCase(job, folder.path()));
   TF_RETURN_IF_ERROR(folder.Publish());
   BuiltPlan plan{

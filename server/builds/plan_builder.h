@@ -31,7 +31,7 @@ struct PlanBuildJob {
   std::string result_folder;  // is not there; appears with all that was made, or not at all
   int threads = 1;
   int cancel = -1;  // a descriptor; the work ends when it becomes readable
-  std::function<void(absl::string_view stage, double fraction)> tell;
+  std::function<void(absl::string_view stage, double fraction)> on_stage;
 };
 
 // What was made: a case that the store has, and the files of the report.

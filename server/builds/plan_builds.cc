@@ -481,7 +481,7 @@ void PlanBuilds::Run(const BuildPtr& build) {
                    .result_folder = FolderOf(build->id) + kResult,
                    .threads = threads_,
                    .cancel = build->cancel,
-                   .tell = [this, build](absl::string_view stage, double fraction) {
+                   .on_stage = [this, build](absl::string_view stage, double fraction) {
                      MutexLock lock(mutex_);
                      build->record.mutable_build()->set_stage(std::string(stage));
                      build->record.mutable_build()->set_fraction(fraction);

@@ -118,10 +118,10 @@ absl::Status NodeTable::Exchange() {
   return status;
 }
 
-void NodeTable::TellReach(std::function<void(bool)> tell) {
+void NodeTable::ObserveReach(std::function<void(bool)> on_change) {
   MutexLock lock(mutex_);
-  tell_ = std::move(tell);
-  if (!reached_ && !draining_) tell_(false);
+  on_reach_change_ = std::move(on_change);
+  if (!reached_ && !draining_) on_reach_change_(false);
 }
 
 void NodeTable::NoteAnswer(bool answered) {
@@ -137,7 +137,7 @@ void NodeTable::NoteAnswer(bool answered) {
   } else {
     spdlog::warn("the database does not answer; calls should go to other servers");
   }
-  if (!draining_) tell_(reached);
+  if (!draining_) on_reach_change_(reached);
 }
 
 void NodeTable::Loop() {

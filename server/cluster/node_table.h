@@ -37,15 +37,15 @@ class NodeTable {
   NodeTable(const NodeTable&) = delete;
   NodeTable& operator=(const NodeTable&) = delete;
 
-  // `tell` is called under a lock when calls should go elsewhere or here: with false when the
+  // `on_change` is called under a lock when calls should go elsewhere or here: with false when the
   // database has not answered for kCutOffAfter, with true when it does again; not once this drains.
-  void TellReach(std::function<void(bool)> tell) ABSL_LOCKS_EXCLUDED(mutex_);
+  void ObserveReach(std::function<void(bool)> on_change) ABSL_LOCKS_EXCLUDED(mutex_);
   // A thread writes and reads from now on, and asks for the free bytes. Once.
   void Start(std::function<int64_t()> free_bytes);
   // Takes its row out, unless the database is away.
   void Stop();
 
-  // Others place nothing here any more; told to the database at once, unless it is away.
+  // Others place nothing here any more; written to the database at once, unless it is away.
   void SetDraining();
 
   // Another one, not draining, that had more than so many bytes free a second ago, the one with the
@@ -82,7 +82,7 @@ class NodeTable {
   std::chrono::steady_clock::time_point answered_ ABSL_GUARDED_BY(mutex_) =
       std::chrono::steady_clock::now();
   bool reached_ ABSL_GUARDED_BY(mutex_) = true;
-  std::function<void(bool)> tell_ ABSL_GUARDED_BY(mutex_) = [](bool /*reached*/) {};
+  std::function<void(bool)> on_reach_change_ ABSL_GUARDED_BY(mutex_) = [](bool /*reached*/) {};
   std::vector<Other> others_ ABSL_GUARDED_BY(mutex_);
   bool draining_ ABSL_GUARDED_BY(mutex_) = false;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;

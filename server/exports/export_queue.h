@@ -58,7 +58,7 @@ class ExportQueue {
   absl::Status LoadAll(const std::function<bool(const std::string& prediction)>& is_there);
 
   // Where others write to the store as well: takes what it has in place of what was known, and
-  // tells what is new, has changed or has gone. Blocks. Errors: those of ExportStore.
+  // reports what is new, has changed or has gone. Blocks. Errors: those of ExportStore.
   absl::Status ReloadRows();
 
   // `wanted` without id, state, times and version. Returns the one of the same request_key, else
@@ -127,7 +127,7 @@ class ExportQueue {
 
   absl::Status Refresh() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   void Index(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Into memory, and told.
+  // Into memory, and reported.
   void Take(const ExportRecord& record) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);
   // Out of memory.
   void Drop(const std::vector<std::string>& ids) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writing_);

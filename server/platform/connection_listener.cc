@@ -30,7 +30,7 @@ namespace {
 constexpr int kBacklog = 512;
 // Between two looks at a listener that has run out of descriptors, and two lines of the log.
 constexpr int kPauseMilliseconds = 20;
-constexpr int kTellMilliseconds = 1000;
+constexpr int kLogMilliseconds = 1000;
 
 std::string Join(const std::string& host, int port) {
   const bool is_ipv6 = host.find(':') != std::string::npos;
@@ -162,7 +162,7 @@ void ConnectionListener::AcceptUntilStopped() {
   for (const int fd : listener_fds_) polled.push_back({fd, POLLIN, 0});
   polled.push_back({stop_fd_, POLLIN, 0});
   while (true) {
-    poll(polled.data(), polled.size(), refused_ > 0 ? kTellMilliseconds : -1);
+    poll(polled.data(), polled.size(), refused_ > 0 ? kLogMilliseconds : -1);
     if (polled.back().revents != 0) return;
     bool any = false;
     for (size_t i = 0; i + 1 < polled.size(); ++i) {
@@ -171,7 +171,7 @@ void ConnectionListener::AcceptUntilStopped() {
       while (AcceptOne(polled[i].fd)) {
       }
     }
-    if (!any) TellOfRefusals();
+    if (!any) LogRefusals();
   }
 }
 
@@ -213,7 +213,7 @@ bool ConnectionListener::TurnOneAway(int listener_fd) {
   return fd >= 0;
 }
 
-void ConnectionListener::TellOfRefusals() {
+void ConnectionListener::LogRefusals() {
   if (refused_ == 0) return;
   spdlog::warn("refused {} connections; {} are open, the limit in all or per address", refused_,
                table_.size());

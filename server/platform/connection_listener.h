@@ -62,7 +62,7 @@ class ConnectionListener {
   // Out of descriptors: frees the spare one for a moment, so that a waiting connection is turned
   // away instead of waiting forever. False: no connection waits.
   bool TurnOneAway(int listener_fd);
-  void TellOfRefusals();
+  void LogRefusals();
 
   // Constant after Listen.
   int port_ = 0;
@@ -73,7 +73,7 @@ class ConnectionListener {
   Handle handle_;
   ConnectionTable table_;
   int spare_fd_ = -1;
-  int refused_ = 0;  // since it was last told
+  int refused_ = 0;  // since the last log line
   std::thread thread_;
 };
 

@@ -70,7 +70,7 @@ ClientMetric::Histogram ToHistogram(const DurationHistogram::Snapshot& snapshot)
 
 class MetricsPage::Families : public prometheus::Collectable {
  public:
-  // False: there is nothing to tell.
+  // False: there is nothing to report.
   using Fill = std::function<bool(ClientMetric*)>;
 
   void Add(const std::string& name, const std::string& help, MetricType type, Labels labels,

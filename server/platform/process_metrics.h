@@ -9,7 +9,7 @@
 
 namespace tissueform {
 
-// What every program tells of its process, by the names that Prometheus' own libraries use:
+// What every program reports about its process, by the names that Prometheus' own libraries use:
 // memory, processor time, descriptors and their limit, when it started; and its version, as
 // `PREFIX_build_info`.
 void AddProcessMetrics(const std::string& prefix, const std::string& version, MetricsPage* page);

@@ -38,15 +38,15 @@ bool IsNo(const std::string& value) {
   return lower == "false" || lower == "off" || lower == "no" || lower == "0";
 }
 
-// `told` where the name may be a typing mistake; the text of a file that was meant for something
+// `message` where the name may be a typing mistake; the text of a file that was meant for something
 // else, a token or a key, is not repeated.
-std::string WrongName(const std::string& name, const std::string& told) {
+std::string WrongName(const std::string& name, const std::string& message) {
   constexpr size_t kLongestName = 40;
   const bool may_be_a_name =
       name.size() <= kLongestName && std::all_of(name.begin(), name.end(), [](unsigned char c) {
         return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-' || c == '_';
       });
-  return may_be_a_name ? told : "it is not a file of options: lines are `name = value`";
+  return may_be_a_name ? message : "it is not a file of options: lines are `name = value`";
 }
 
 // CLI11's own reader of files, which lets a file win over the environment, passes over what it does
@@ -91,7 +91,7 @@ class ConfigFile final : public CLI::ConfigBase {
   const std::string prefix_;
 };
 
-// What a file must not tell.
+// Without the parts of an address that may be secret.
 std::string Hide(const std::string& value) {
   const size_t scheme = value.find("://");
   if (scheme == std::string::npos) return value;

@@ -25,7 +25,7 @@ void AddRemovedOption(CLI::App& app, const std::string& name, const std::string&
 
 // Parses the command line and what AddConfiguration has added. An exit code when the program is to
 // end: 0 when --help or --print-config was answered on stdout, 2 when an option is wrong, which is
-// told on stderr in one line.
+// reported on stderr in one line.
 std::optional<int> ParseProgramOptions(CLI::App& app, int argc, const char* const* argv);
 
 // Every option of a parsed `app` that may stand in a file, with its value, one a line: --config

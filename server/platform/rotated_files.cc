@@ -24,7 +24,7 @@ namespace {
 constexpr std::chrono::seconds kLookInterval{1};
 constexpr unsigned kWatcherSeconds = 1;
 constexpr std::chrono::hours kSoon{14 * 24};
-constexpr std::chrono::hours kTellInterval{24};
+constexpr std::chrono::hours kExpiryLogInterval{24};
 
 absl::Status CannotKeep() {
   return absl::InternalError(
@@ -126,32 +126,32 @@ absl::Status RotatedFiles::Use(const TlsContents& contents) {
   return absl::OkStatus();
 }
 
-void RotatedFiles::TellOfExpiry() {
+void RotatedFiles::LogExpiry() {
   const auto now = std::chrono::system_clock::now();
   const auto left = expiry() - now;
-  if (identity_ == nullptr || left > kSoon || now - told_of_expiry_ < kTellInterval) return;
-  told_of_expiry_ = now;
+  if (identity_ == nullptr || left > kSoon || now - expiry_logged_at_ < kExpiryLogInterval) return;
+  expiry_logged_at_ = now;
   spdlog::warn("the certificate expires in {} h; renew it by rewriting its file",
                std::chrono::duration_cast<std::chrono::hours>(left).count());
 }
 
 void RotatedFiles::Watch() {
   absl::Status last;
-  std::string told;
+  std::string logged;
   MutexLock lock(mutex_);
   while (!ends_) {
     if (!ending_.WaitUntil(mutex_, std::chrono::steady_clock::now() + kLookInterval)) {
-      TellOfExpiry();
+      LogExpiry();
       const absl::Status status = LookAgain();
       // Twice the same: not just between the writing of two files that belong together.
-      if (!status.ok() && status == last && told != status.message()) {
-        told = std::string(status.message());
-        spdlog::error("ALARM: certificates: {}; the previous ones stay in use", told);
+      if (!status.ok() && status == last && logged != status.message()) {
+        logged = std::string(status.message());
+        spdlog::error("ALARM: certificates: {}; the previous ones stay in use", logged);
         alarm_ = true;
       }
       if (status.ok()) {
         alarm_ = false;
-        told.clear();
+        logged.clear();
       }
       last = status;
     }

@@ -71,7 +71,7 @@ class RotatedFiles {
   absl::Status Use(const TlsContents& contents);
   void Watch();
   // Once a day when the certificate ends soon.
-  void TellOfExpiry();
+  void LogExpiry();
   // OK: what stands in the files is in use.
   absl::Status LookAgain();
 
@@ -89,7 +89,7 @@ class RotatedFiles {
 
   // The thread's.
   TlsContents used_;
-  std::chrono::system_clock::time_point told_of_expiry_ = {};
+  std::chrono::system_clock::time_point expiry_logged_at_ = {};
 
   Mutex mutex_;
   ConditionVariable ending_;

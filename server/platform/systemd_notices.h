@@ -18,8 +18,8 @@ namespace tissueform {
 void TellSystemdReady();
 void TellSystemdStopping();
 
-// Tells systemd that the program lives, as often as its unit's WatchdogSec asks, and no longer than
-// the program itself says so: systemd ends a program that is silent, and starts it again.
+// Notifies systemd that the program lives, as often as its unit's WatchdogSec asks, and no longer
+// than the program itself says so: systemd ends a program that is silent, and starts it again.
 class SystemdWatchdog {
  public:
   // Asks the program: `answered` is to be called once, by any thread, when the program does its

@@ -12,7 +12,7 @@
 #include "server/store/case_store.h"
 
 // What a call names, once it is known that its caller may have it: read from its name, asked for at
-// `access`, told to the scope.
+// `access`, set in the scope.
 namespace tissueform {
 
 // The id, or the SHA-256. Errors: InvalidArgument (no such name), those of Access.

@@ -91,9 +91,9 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
       TF_ASSIGN_OR_RETURN(choice_, ToVertexChoice(request_.vertices(),
                                                   one_.prediction.vertex_count(), /*skin=*/{}));
     }
-    v1::PredictionComparison& told = comparison_;
-    told.set_prediction(one_.prediction.name());
-    told.set_model(one_.prediction.model());
+    v1::PredictionComparison& comparison = comparison_;
+    comparison.set_prediction(one_.prediction.name());
+    comparison.set_model(one_.prediction.model());
     if (request_.has_other_model()) {
       TF_ASSIGN_OR_RETURN(const std::string session, ParseSessionName(one_.prediction.session()));
       TF_RETURN_IF_ERROR(
@@ -113,10 +113,10 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
           "the predictions have different meshes, whose vertices do not correspond; compare two "
           "of one mesh");
     }
-    told.set_other_prediction(other.prediction.name());
-    told.set_other_model(other.prediction.model());
-    *told.mutable_other_summary() = other.prediction.summary();
-    *told.mutable_other_quality() = other.prediction.quality();
+    comparison.set_other_prediction(other.prediction.name());
+    comparison.set_other_model(other.prediction.model());
+    *comparison.mutable_other_summary() = other.prediction.summary();
+    *comparison.mutable_other_quality() = other.prediction.quality();
     PostCompare(std::move(other.positions));
     return absl::OkStatus();
   }
@@ -192,8 +192,8 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
   }
 
   bool NextMessage(v1::ComparePredictionsResponse* message) {
-    if (!told_) {
-      told_ = true;
+    if (!comparison_sent_) {
+      comparison_sent_ = true;
       *message->mutable_comparison() = std::move(comparison_);
       return true;
     }
@@ -211,7 +211,7 @@ class Comparison final : public MessageStream<v1::ComparePredictionsResponse> {
   v1::PredictionComparison comparison_;
   std::string differences_;
   size_t offset_ = 0;
-  bool told_ = false;
+  bool comparison_sent_ = false;
 };
 
 }  // namespace

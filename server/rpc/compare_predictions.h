@@ -18,7 +18,7 @@
 namespace tissueform {
 
 // Begins one ComparePredictions call: reads what is kept, asks the session where a model is
-// compared and the catalog what is skin, and tells how far the two lie apart. It deletes itself.
+// compared and the catalog what is skin, and reports how far the two lie apart. It deletes itself.
 // `context` may be null (see CallScope); all other pointers must outlive the call.
 grpc::ServerWriteReactor<v1::ComparePredictionsResponse>* StartComparison(
     CallScope scope, grpc::CallbackServerContext* context, DeadlineTimer* timer,

@@ -31,7 +31,7 @@ DeformStreamReactor::DeformStreamReactor(CallScope scope, const ServiceLimits& l
       authorization_(
           timer, &registry->pool(), kReauthorizePeriod, [this] { return AuthorizationQuestion(); },
           [this](const absl::Status& status) { EndUnauthorized(status); }),
-      followers_(timer, [this](int count) { TellFollowers(count); }),
+      followers_(timer, [this](int count) { NotifyFollowers(count); }),
       commits_(
           [registry](std::shared_ptr<const Session> session, std::vector<HandlePose> poses,
                      StreamCommits::Outcome done) {
@@ -153,7 +153,7 @@ void DeformStreamReactor::OnDone() {
   delete this;
 }
 
-void DeformStreamReactor::TellFollowers(int count) {
+void DeformStreamReactor::NotifyFollowers(int count) {
   MutexLock lock(mutex_);
   notices_.emplace_back().mutable_followers()->set_count(count);
   Advance();

@@ -62,7 +62,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void OnCancel() override;
   void OnDone() override;
 
-  // Tells the client that the server drains, and when it ends. Any thread.
+  // Notifies the client that the server drains, and when it ends. Any thread.
   void NotifyDraining(std::chrono::system_clock::time_point end);
   // Ends the stream where it is of this session, and that is not held any more. Any thread.
   void EndIfMoved(const std::string& session_id);
@@ -105,7 +105,7 @@ class DeformStreamReactor : public grpc::ServerBidiReactor<v1::DeformRequest, v1
   void Prepare(const StreamConfiguration& configuration) ABSL_LOCKS_EXCLUDED(mutex_);
 
   void FinishCommit(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex_);
-  void TellFollowers(int count) ABSL_LOCKS_EXCLUDED(mutex_);
+  void NotifyFollowers(int count) ABSL_LOCKS_EXCLUDED(mutex_);
   // The hand may have rested since the last estimate.
   void EndRest() ABSL_LOCKS_EXCLUDED(mutex_);
 

@@ -19,7 +19,7 @@ namespace tissueform {
 
 class DeformStreamReactor;
 
-// The open Deform streams of a server: bounds their number and tells them news.
+// The open Deform streams of a server: bounds their number and notifies them.
 //
 // Thread-safe. Its lock comes before the lock of a stream.
 class DeformStreams {

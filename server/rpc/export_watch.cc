@@ -191,8 +191,8 @@ bool ExportWatch::NextMessage() {
     *message_.mutable_export_() = ToProto(*record);
     return true;
   }
-  if (told_all_) return std::chrono::steady_clock::now() - written_at_ >= kSilence;
-  told_all_ = true;
+  if (sent_all_) return std::chrono::steady_clock::now() - written_at_ >= kSilence;
+  sent_all_ = true;
   return true;
 }
 

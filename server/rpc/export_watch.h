@@ -101,7 +101,7 @@ class ExportWatch : public grpc::ServerWriteReactor<v1::WatchExportsResponse>,
   bool writing_ ABSL_GUARDED_BY(mutex_) = false;
   TimePoint written_at_ ABSL_GUARDED_BY(mutex_);           // when the last message was begun
   std::set<std::string> changed_ ABSL_GUARDED_BY(mutex_);  // ids that are still to be sent
-  bool told_all_ ABSL_GUARDED_BY(mutex_) = false;
+  bool sent_all_ ABSL_GUARDED_BY(mutex_) = false;
   bool finished_ ABSL_GUARDED_BY(mutex_) = false;
   DeadlineTimer::Id tick_ ABSL_GUARDED_BY(mutex_);
   std::optional<absl::Status> outcome_ ABSL_GUARDED_BY(mutex_);  // set: nothing new is started

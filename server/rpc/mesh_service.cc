@@ -27,7 +27,7 @@ namespace {
 struct SurfaceToSend {
   MeshSurface surface;
   MemoryReservation reservation;
-  bool told = false;  // the header
+  bool header_sent = false;
   size_t offset = 0;
 };
 
@@ -48,7 +48,7 @@ absl::StatusOr<std::shared_ptr<SurfaceToSend>> MakeSurface(const v1::GetSurfaceR
 }
 
 bool NextOfSurface(SurfaceToSend* to_send, v1::GetSurfaceResponse* message) {
-  if (!std::exchange(to_send->told, true)) {
+  if (!std::exchange(to_send->header_sent, true)) {
     *message->mutable_header() = to_send->surface.header;
     return true;
   }

@@ -19,7 +19,7 @@ namespace tissueform {
 // What GetSurface sends of a mesh.
 struct MeshSurface {
   v1::SurfaceHeader header;
-  std::string bytes;  // SurfaceHeader tells their order
+  std::string bytes;  // SurfaceHeader defines their order
 };
 
 // The arrays of these names. Errors: InvalidArgument (the mesh has no such one, or they are more

@@ -51,7 +51,7 @@ class MeshUploadStream final : public UploadStream<v1::UploadMeshRequest> {
   v1::UploadMeshResponse* const response_;
 
   // The job's alone.
-  std::string sha256_;                  // that the header tells
+  std::string sha256_;                  // that the header states
   std::unique_ptr<MeshUpload> upload_;  // null before the header
 };
 

@@ -20,7 +20,7 @@
 namespace tissueform {
 namespace {
 
-// How often a watch tells the state; it asks at the same time whether its caller is still good.
+// How often a watch sends the state and rechecks the authorization of its caller.
 constexpr std::chrono::milliseconds kWatchPeriod = kReauthorizePeriod;
 
 bool IsDone(const v1::PlanBuild& build) {

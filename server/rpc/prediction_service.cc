@@ -28,7 +28,7 @@
 namespace tissueform {
 namespace {
 
-// A page fits into the 4 MiB that clients take by default, however much each prediction tells.
+// A page fits into the 4 MiB that clients take by default, however large each prediction is.
 constexpr size_t kPageBytes = size_t{2} << 20;
 
 // One CreatePrediction call. Deletes itself when gRPC is done with it.

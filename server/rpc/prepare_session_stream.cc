@@ -43,7 +43,7 @@ PrepareSessionStream::PrepareSessionStream(CallScope scope, const ServiceLimits&
       start_(clock->Now()),
       preparation_(std::make_shared<SessionPreparation>(
           limits, access, catalog, registry, request,
-          [this](const SessionProgress& progress) { Tell(progress); },
+          [this](const SessionProgress& progress) { TakeProgress(progress); },
           [this](const std::string& resource) { TakeAllowed(resource); },
           [this](absl::StatusOr<v1::Session> result) { TakeResult(std::move(result)); })),
       pace_(clock) {
@@ -77,7 +77,7 @@ void PrepareSessionStream::OnDone() {
   delete this;
 }
 
-void PrepareSessionStream::Tell(const SessionProgress& progress) {
+void PrepareSessionStream::TakeProgress(const SessionProgress& progress) {
   MutexLock lock(mutex_);
   pace_.Offer(progress);
   Advance();

@@ -19,7 +19,7 @@
 
 namespace tissueform {
 
-// One PrepareSession call: tells the newest progress, with one write in flight, then the session.
+// One PrepareSession call: sends the newest progress, with one write in flight, then the session.
 // Deletes itself when gRPC is done with it.
 //
 // The preparation is never called under the mutex, which its callbacks take. It answers once in any
@@ -37,7 +37,7 @@ class PrepareSessionStream : public grpc::ServerWriteReactor<v1::PrepareSessionR
   void OnDone() override;
 
  private:
-  void Tell(const SessionProgress& progress) ABSL_LOCKS_EXCLUDED(mutex_);
+  void TakeProgress(const SessionProgress& progress) ABSL_LOCKS_EXCLUDED(mutex_);
   void TakeAllowed(const std::string& resource) ABSL_LOCKS_EXCLUDED(mutex_);
   void TakeResult(absl::StatusOr<v1::Session> result) ABSL_LOCKS_EXCLUDED(mutex_);
   // Writes what there is to say, or ends.

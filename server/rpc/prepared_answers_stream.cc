@@ -133,8 +133,8 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
   }
 
   bool NextMessage(v1::GetPreparedAnswersResponse* message) {
-    if (!told_) {
-      told_ = true;
+    if (!header_sent_) {
+      header_sent_ = true;
       *message->mutable_header() = std::move(header_);
       return true;
     }
@@ -157,7 +157,7 @@ class PreparedAnswersStream final : public MessageStream<v1::GetPreparedAnswersR
   std::string bytes_;
   v1::PreparedAnswersHeader header_;
   size_t offset_ = 0;
-  bool told_ = false;
+  bool header_sent_ = false;
 };
 
 }  // namespace

@@ -17,14 +17,15 @@ namespace tissueform {
 
 SessionPreparation::SessionPreparation(const ServiceLimits& limits, Access* access,
                                        MeshCatalog* catalog, SessionRegistry* registry,
-                                       v1::PrepareSessionRequest request, TellSession tell,
-                                       OnAllowed on_allowed, Done done)
+                                       v1::PrepareSessionRequest request,
+                                       SessionProgressCallback on_progress, OnAllowed on_allowed,
+                                       Done done)
     : limits_(limits),
       access_(access),
       catalog_(catalog),
       registry_(registry),
       request_(std::move(request)),
-      tell_(std::move(tell)),
+      on_progress_(std::move(on_progress)),
       on_allowed_(std::move(on_allowed)),
       done_(std::move(done)) {}
 
@@ -86,7 +87,7 @@ absl::Status SessionPreparation::Begin(const Principal& caller) {
 absl::Status SessionPreparation::BeginCreation(const Principal& caller) {
   TF_ASSIGN_OR_RETURN(const std::string sha256, ParseMeshName(request_.create().mesh()));
   if (auto mesh = catalog_->Find(sha256); mesh != nullptr) return Make(caller, mesh);
-  Tell({SessionStage::kReadingMesh});
+  ReportProgress({SessionStage::kReadingMesh});
   TF_ASSIGN_OR_RETURN(const std::shared_ptr<const StoredMesh> mesh, catalog_->Load(sha256));
   return Make(caller, mesh);
 }
@@ -106,7 +107,7 @@ absl::Status SessionPreparation::Make(const Principal& caller,
           self->Finish(session.status());
         }
       },
-      Teller());
+      ProgressCallback());
   return absl::OkStatus();
 }
 
@@ -126,7 +127,7 @@ absl::Status SessionPreparation::BeginUpdate() {
           self->Finish(view.status());
         }
       },
-      Teller());
+      ProgressCallback());
   return absl::OkStatus();
 }
 
@@ -141,18 +142,20 @@ absl::Status SessionPreparation::BeginOpening() {
           self->Finish(session.status());
         }
       },
-      Teller());
+      ProgressCallback());
   return absl::OkStatus();
 }
 
-TellSession SessionPreparation::Teller() {
-  if (!tell_) return {};
-  return [self = shared_from_this()](const SessionProgress& progress) { self->Tell(progress); };
+SessionProgressCallback SessionPreparation::ProgressCallback() {
+  if (!on_progress_) return {};
+  return [self = shared_from_this()](const SessionProgress& progress) {
+    self->ReportProgress(progress);
+  };
 }
 
-void SessionPreparation::Tell(const SessionProgress& progress) {
+void SessionPreparation::ReportProgress(const SessionProgress& progress) {
   MutexLock lock(mutex_);  // so that `done` comes after it
-  if (done_ && tell_) tell_(progress);
+  if (done_ && on_progress_) on_progress_(progress);
 }
 
 void SessionPreparation::TakeSession(const std::shared_ptr<Session>& session,
@@ -177,7 +180,7 @@ absl::Status SessionPreparation::BeginAnswers(const std::shared_ptr<Session>& se
   }
   std::shared_ptr<const ProgressFeed::Follower> follower;
   if (configuration->response.has_value()) {
-    follower = session->Follow(*configuration->response, Teller());
+    follower = session->Follow(*configuration->response, ProgressCallback());
   }
   session->making_strand().Post(
       Lane::kBatch, [self = shared_from_this(), configuration, follower = std::move(follower),
@@ -187,7 +190,7 @@ absl::Status SessionPreparation::BeginAnswers(const std::shared_ptr<Session>& se
 
 void SessionPreparation::MakeAnswers(const StreamConfiguration& configuration,
                                      const std::shared_ptr<Session>& claimed) {
-  Tell({SessionStage::kAnswers});
+  ReportProgress({SessionStage::kAnswers});
   const absl::Status made =
       PrepareAnswers(configuration, Cancellation([flag = cancelled_] { return flag->load(); }))
           .status();

@@ -36,11 +36,11 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   // Gets the name of the session that the call may use.
   using OnAllowed = std::function<void(const std::string& resource)>;
 
-  // `tell` (may be empty) and `on_allowed` are no longer called once `done` is. All may take locks
-  // of their own, but must not call this object under them. The pointers must outlive it.
+  // `on_progress` (may be empty) and `on_allowed` are no longer called once `done` is. All may take
+  // locks of their own, but must not call this object under them. The pointers must outlive it.
   SessionPreparation(const ServiceLimits& limits, Access* access, MeshCatalog* catalog,
-                     SessionRegistry* registry, v1::PrepareSessionRequest request, TellSession tell,
-                     OnAllowed on_allowed, Done done);
+                     SessionRegistry* registry, v1::PrepareSessionRequest request,
+                     SessionProgressCallback on_progress, OnAllowed on_allowed, Done done);
 
   // Once. `admission` is why the call is not served, or OK; `caller` whose session it will be.
   //
@@ -66,8 +66,8 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   absl::Status BeginOpening();
   absl::Status Make(const Principal& caller, const std::shared_ptr<const StoredMesh>& mesh);
 
-  TellSession Teller();
-  void Tell(const SessionProgress& progress) ABSL_LOCKS_EXCLUDED(mutex_);
+  SessionProgressCallback ProgressCallback();
+  void ReportProgress(const SessionProgress& progress) ABSL_LOCKS_EXCLUDED(mutex_);
   // The session is made; `claimed` is the same or null.
   void TakeSession(const std::shared_ptr<Session>& session,
                    const std::shared_ptr<Session>& claimed);
@@ -88,7 +88,7 @@ class SessionPreparation : public std::enable_shared_from_this<SessionPreparatio
   MeshCatalog* const catalog_;
   SessionRegistry* const registry_;
   const v1::PrepareSessionRequest request_;
-  const TellSession tell_;
+  const SessionProgressCallback on_progress_;
   const OnAllowed on_allowed_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
 

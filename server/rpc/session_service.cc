@@ -26,7 +26,7 @@ class PreparationCall : public grpc::ServerUnaryReactor {
                   v1::PrepareSessionRequest request, v1::Session* response)
       : scope_(std::move(scope)),
         preparation_(std::make_shared<SessionPreparation>(
-            limits, access, catalog, registry, std::move(request), /*tell=*/nullptr,
+            limits, access, catalog, registry, std::move(request), /*on_progress=*/nullptr,
             [this](const std::string& resource) { scope_.SetResource(resource); },
             [this, response](absl::StatusOr<v1::Session> session) {
               const absl::Status outcome = session.status();

@@ -24,7 +24,7 @@ void StreamCommits::StartNext(const std::shared_ptr<Session>& session) {
   WaitingPose pose = *std::exchange(next_, std::nullopt);
   send_(session, std::move(pose.poses),
         [way_back = way_back_, sequence = pose.sequence](const absl::Status& outcome) {
-          way_back->Tell(sequence, outcome);
+          way_back->Answer(sequence, outcome);
         });
 }
 
@@ -41,7 +41,7 @@ void StreamCommits::Stop() {
   way_back_->answered = nullptr;
 }
 
-void StreamCommits::WayBack::Tell(uint64_t sequence, const absl::Status& outcome) {
+void StreamCommits::WayBack::Answer(uint64_t sequence, const absl::Status& outcome) {
   MutexLock lock(mutex);
   if (answered) answered(sequence, outcome);
 }

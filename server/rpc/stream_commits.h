@@ -53,7 +53,7 @@ class StreamCommits {
     Mutex mutex;                               // before the owner's lock
     Answered answered ABSL_GUARDED_BY(mutex);  // empty once stopped
 
-    void Tell(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex);
+    void Answer(uint64_t sequence, const absl::Status& outcome) ABSL_LOCKS_EXCLUDED(mutex);
   };
 
   const Send send_;

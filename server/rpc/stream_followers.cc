@@ -8,27 +8,27 @@
 
 namespace tissueform {
 
-StreamFollowers::StreamFollowers(DeadlineTimer* timer, Tell tell)
-    : timer_(timer), tell_(std::move(tell)) {}
+StreamFollowers::StreamFollowers(DeadlineTimer* timer, OnCount on_count)
+    : timer_(timer), on_count_(std::move(on_count)) {}
 
 void StreamFollowers::FollowersChanged(int count) {
   MutexLock lock(mutex_);
   count_ = count;
   if (std::exchange(is_due_, true)) return;
-  due_ = timer_->Start(std::chrono::steady_clock::now(), [this] { TellNews(); });
+  due_ = timer_->Start(std::chrono::steady_clock::now(), [this] { ReportNews(); });
 }
 
 // Until there is nothing new: one call at a time is under way, the one that Stop waits for.
-void StreamFollowers::TellNews() {
+void StreamFollowers::ReportNews() {
   while (true) {
     int count = 0;
     {
       MutexLock lock(mutex_);
-      is_due_ = count_ != told_;
+      is_due_ = count_ != reported_;
       if (!is_due_) return;
-      count = told_ = count_;
+      count = reported_ = count_;
     }
-    tell_(count);
+    on_count_(count);
   }
 }
 

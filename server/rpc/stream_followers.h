@@ -19,27 +19,28 @@ class StreamFollowers final : public Dragger {
  public:
   // On the timer's thread, without a lock held; each time another number than before, at first not
   // 0.
-  using Tell = std::function<void(int count)>;
+  using OnCount = std::function<void(int count)>;
 
   // `timer` must outlive it.
-  StreamFollowers(DeadlineTimer* timer, Tell tell);
+  StreamFollowers(DeadlineTimer* timer, OnCount on_count);
 
   void FollowersChanged(int count) override ABSL_LOCKS_EXCLUDED(mutex_);
 
-  // Once it has returned, `tell` neither runs nor will. Not with a lock held that `tell` takes.
+  // Once it has returned, `on_count` neither runs nor will. Not with a lock held that `on_count`
+  // takes.
   // REQUIRES: no channel knows it any more.
   void Stop() ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  void TellNews() ABSL_LOCKS_EXCLUDED(mutex_);
+  void ReportNews() ABSL_LOCKS_EXCLUDED(mutex_);
 
   DeadlineTimer* const timer_;
-  const Tell tell_;
+  const OnCount on_count_;
 
   Mutex mutex_;  // innermost but for the timer's
   int count_ ABSL_GUARDED_BY(mutex_) = 0;
-  int told_ ABSL_GUARDED_BY(mutex_) = 0;
-  bool is_due_ ABSL_GUARDED_BY(mutex_) = false;  // a call of TellNews is under way
+  int reported_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool is_due_ ABSL_GUARDED_BY(mutex_) = false;  // a call of ReportNews is under way
   DeadlineTimer::Id due_ ABSL_GUARDED_BY(mutex_);
 };
 

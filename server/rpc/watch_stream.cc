@@ -223,7 +223,7 @@ void WatchStreamReactor::Show(const std::shared_ptr<const WatchedFrame>& frame) 
   Advance();
 }
 
-void WatchStreamReactor::Tell(const v1::DeformNotice& notice) {
+void WatchStreamReactor::Notify(const v1::DeformNotice& notice) {
   MutexLock lock(mutex_);
   notices_.push_back(notice);
   Advance();

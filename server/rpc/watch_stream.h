@@ -49,7 +49,7 @@ class WatchStreamReactor : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void OnDone() override;
 
   void Show(const std::shared_ptr<const WatchedFrame>& frame) override;
-  void Tell(const v1::DeformNotice& notice) override;
+  void Notify(const v1::DeformNotice& notice) override;
   void EndWatch(const absl::Status& outcome) override;
   absl::Status Acknowledge(uint64_t number, const Authenticated& by) override;
 

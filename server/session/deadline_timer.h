@@ -14,7 +14,7 @@
 
 namespace tissueform {
 
-// Tells those who wait for a client that it has had its time. One thread of its own.
+// Notifies waiters that the time of their client is over. One thread of its own.
 //
 // Thread-safe.
 class DeadlineTimer {

@@ -121,7 +121,7 @@ void FrameScheduler::Offer(AnswerFrame frame) {
     unacked_.push_back({*last_frame_, pose_arrived_});
   }
   if (frame.refinement > 0) {
-    frame.coalesced_count = 0;  // told by the first frame of the pose
+    frame.coalesced_count = 0;  // reported by the first frame of the pose
   }
   frame_ = std::move(frame);
 }

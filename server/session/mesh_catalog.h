@@ -63,7 +63,7 @@ class MeshCatalog {
   MeshCatalog(const ServiceLimits& limits, MemoryBudget* budget, MeshStore* store = nullptr,
               const Clock* clock = Clock::System(), UnixClock unix_clock = SystemUnixSeconds);
 
-  // Told of every mesh that is not there any more, from any thread, without a lock held. It may not
+  // Called for every mesh that was removed, from any thread, without a lock held. It may not
   // block. Call it before anything else.
   void set_on_removed(std::function<void(const std::string& sha256)> on_removed) {
     on_removed_ = std::move(on_removed);

@@ -37,7 +37,7 @@ DeformerOptions OptionsOf(const SessionRecord& record) {
   options.preparation.node_order = record.node_order;
   options.gradient_field = record.gradient_field;
   if (record.seals_lips) options.seal = record.lip_edge;
-  // Told in every answer; a small part of a solve.
+  // Reported in every answer; a small part of a solve.
   options.gradient_field.compute_residual = true;
   return options;
 }
@@ -191,10 +191,10 @@ absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> Session::PrepareResponse(
   return claim;
 }
 
-std::shared_ptr<const ProgressFeed::Follower> Session::Follow(const ResponseRequest& request,
-                                                              TellSession tell) const {
+std::shared_ptr<const ProgressFeed::Follower> Session::Follow(
+    const ResponseRequest& request, SessionProgressCallback on_progress) const {
   const absl::StatusOr<std::shared_ptr<SharedPreparation>> preparation = OpenPreparation();
-  return preparation.ok() ? (*preparation)->Follow(request, std::move(tell)) : nullptr;
+  return preparation.ok() ? (*preparation)->Follow(request, std::move(on_progress)) : nullptr;
 }
 
 absl::StatusOr<Deformation> Session::Solve(DeformationModel model,

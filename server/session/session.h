@@ -146,7 +146,7 @@ class Session {
   // Any thread. Hears how far the prepared answers are for as long as the result lives; see
   // SharedPreparation::Follow. Null once closed.
   std::shared_ptr<const ProgressFeed::Follower> Follow(const ResponseRequest& request,
-                                                       TellSession tell) const;
+                                                       SessionProgressCallback on_progress) const;
 
   enum class CloseReason { kDeleted, kEvicted, kUpdated, kMoved };
 

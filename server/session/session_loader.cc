@@ -33,19 +33,19 @@ bool SessionLoader::Flight::wanted() const {
 }
 
 SessionLoader::Waiter SessionLoader::MakeWaiter(CancelFlag cancelled, const SessionCallback& done,
-                                                const TellSession& tell) {
-  if (!naming_room_) return {std::move(cancelled), done, tell};
+                                                const SessionProgressCallback& on_progress) {
+  if (!naming_room_) return {std::move(cancelled), done, on_progress};
   return {std::move(cancelled),
           [this, done](absl::StatusOr<std::shared_ptr<Session>> made) {
             done(made.ok() ? std::move(made) : naming_room_(made.status()));
           },
-          tell};
+          on_progress};
 }
 
 void SessionLoader::Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
                            CancelFlag cancelled, const SessionCallback& done,
-                           const TellSession& tell) {
-  const Waiter waiter = MakeWaiter(std::move(cancelled), done, tell);
+                           const SessionProgressCallback& on_progress) {
+  const Waiter waiter = MakeWaiter(std::move(cancelled), done, on_progress);
   if (record.id.empty()) {
     record.id = RandomId();
     CreateKnown(std::move(record), mesh, waiter);
@@ -76,13 +76,13 @@ void SessionLoader::CreateKnown(SessionRecord record, const std::shared_ptr<cons
 }
 
 void SessionLoader::Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
-                         const TellSession& tell) {
+                         const SessionProgressCallback& on_progress) {
   if (absl::StatusOr<std::shared_ptr<Session>> session = table_->Find(id); session.ok()) {
     done(std::move(session));
     return;
   }
   sync_->WhenKnown(id, StoreSync::Patience::kBrief,
-                   [this, id, waiter = MakeWaiter(std::move(cancelled), done, tell),
+                   [this, id, waiter = MakeWaiter(std::move(cancelled), done, on_progress),
                     done](const absl::Status& known) {
                      if (!known.ok()) {
                        done(known);
@@ -159,7 +159,7 @@ void SessionLoader::GoOn(const Arrival& arrival, const Waiter& waiter) {
   } else if (arrival.found.session != nullptr) {
     waiter.done(arrival.found.session);
   } else if (arrival.started == nullptr) {
-    if (arrival.joined.has_value() && waiter.tell) waiter.tell(*arrival.joined);
+    if (arrival.joined.has_value() && waiter.on_progress) waiter.on_progress(*arrival.joined);
   } else if (arrival.started->creates()) {
     StartCreation(arrival.started);
   } else {
@@ -174,7 +174,7 @@ void SessionLoader::StartCreation(const FlightPtr& flight) {
            FinishCreation(flight, made.status());
            return;
          }
-         CallerOf(flight).Tell(SessionStage::kKeeping);
+         CallerOf(flight).Report(SessionStage::kKeeping);
          Keep(*std::move(made),
               [this, flight](const absl::StatusOr<std::shared_ptr<Session>>& kept) {
                 FinishCreation(flight, kept);
@@ -198,16 +198,16 @@ SessionLoader::Caller SessionLoader::CallerOf(const FlightPtr& flight) {
             MutexLock lock(mutex_);
             return !flight->wanted();
           }),
-          .tell = [this, flight](const SessionProgress& progress) {
-            std::vector<TellSession> listening;
+          .on_progress = [this, flight](const SessionProgress& progress) {
+            std::vector<SessionProgressCallback> listening;
             {
               MutexLock lock(mutex_);
               flight->newest = progress;
               for (const Waiter& waiter : flight->waiters) {
-                if (waiter.tell) listening.push_back(waiter.tell);
+                if (waiter.on_progress) listening.push_back(waiter.on_progress);
               }
             }
-            for (const TellSession& tell : listening) tell(progress);
+            for (const SessionProgressCallback& on_progress : listening) on_progress(progress);
           }};
 }
 
@@ -306,13 +306,13 @@ void SessionLoader::Make(SessionRecord record, std::shared_ptr<const StoredMesh>
                          Caller caller, ViewCallback done) {
   std::shared_ptr<SharedPreparation> preparation = preparations_.Find(record);
   Strand& strand = preparation->strand();
-  caller.Tell(SessionStage::kWaiting);
+  caller.Report(SessionStage::kWaiting);
   // From now on: what this one needs may already be under way for other callers.
-  auto follower = preparation->Follow(record.model, caller.tell);
+  auto follower = preparation->Follow(record.model, caller.on_progress);
   strand.Post(Lane::kBatch, [this, record = std::move(record), mesh = std::move(mesh),
                              preparation = std::move(preparation), caller = std::move(caller),
                              follower = std::move(follower), done = std::move(done)]() mutable {
-    caller.Tell(SessionStage::kAssembling);
+    caller.Report(SessionStage::kAssembling);
     absl::StatusOr<std::shared_ptr<Session>> session =
         Session::Create(record, std::move(mesh), preparation, budget_->AccountOf(record.owner),
                         pool_, clock_, caller.cancellation);
@@ -348,7 +348,7 @@ void SessionLoader::Keep(SessionView made, const SessionCallback& done) {
 
 void SessionLoader::Remake(const std::string& id, const Change& change, const Caller& caller,
                            const ViewCallback& done) {
-  caller.Tell(SessionStage::kReadingMesh);
+  caller.Report(SessionStage::kReadingMesh);
   // Before the record is read: no other server writes it from then on.
   leases_->Take(id, [this, id, change, caller, done](absl::StatusOr<SessionLeaseHandlePtr> hold) {
     if (!hold.ok()) {
@@ -402,10 +402,11 @@ void SessionLoader::MakeChanged(const SessionRecord& record, const Change& chang
 }
 
 void SessionLoader::Update(const std::string& id, const std::string& etag, const Change& change,
-                           CancelFlag cancelled, const ViewCallback& done, TellSession tell) {
+                           CancelFlag cancelled, const ViewCallback& done,
+                           SessionProgressCallback on_progress) {
   const Caller caller{.cancellation = Cancellation(
                           [cancelled = std::move(cancelled)] { return cancelled->load(); }),
-                      .tell = std::move(tell)};
+                      .on_progress = std::move(on_progress)};
   // Before anything is prepared for a change that cannot be kept.
   const Change checked = [etag, change](SessionRecord record,
                                         const StoredMesh& mesh) -> absl::StatusOr<SessionRecord> {
@@ -441,7 +442,7 @@ void SessionLoader::KeepUpdate(absl::StatusOr<SessionView> remade, const Caller&
     done(refusal);
     return;
   }
-  caller.Tell(SessionStage::kKeeping);
+  caller.Report(SessionStage::kKeeping);
   sync_->KeepUpdate(*std::move(remade), done);
 }
 

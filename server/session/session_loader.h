@@ -57,7 +57,7 @@ class SessionLoader {
   // Makes a session of `record` on a worker, keeps the record and calls `done` once. A record
   // without id gets a random one. Calls with the same request id share one session; its creation
   // stops early when `cancelled` is set for all its callers. `mesh` is the one that the record
-  // names. `tell` gets the progress, also of a creation that was begun for another caller.
+  // names. `on_progress` gets the progress, also of a creation that was begun for another caller.
   //
   // Every successful answer is a claim on the session, see StoreSync::Abandon. A session whose
   // lease cannot be taken is created, too, but CheckHeld refuses it.
@@ -65,7 +65,8 @@ class SessionLoader {
   // Errors: those of Session::Create, SessionTable::BeginCreation and SessionStore::Create;
   // InvalidArgument (the request id belongs to another request); Cancelled.
   void Create(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
-              CancelFlag cancelled, const SessionCallback& done, const TellSession& tell = {});
+              CancelFlag cancelled, const SessionCallback& done,
+              const SessionProgressCallback& on_progress = {});
 
   // Gives the session, loaded from its record where it is not in memory. At once where it is.
   //
@@ -73,7 +74,7 @@ class SessionLoader {
   // MeshCatalog::Load; ResourceExhausted; Cancelled; Unavailable (SESSION_MOVED: it was lost while
   // it was loaded).
   void Open(const std::string& id, CancelFlag cancelled, const SessionCallback& done,
-            const TellSession& tell = {});
+            const SessionProgressCallback& on_progress = {});
 
   // Prepares the session again from its record as `change`, on a worker, leaves it, then puts that
   // into the place of the old one, which closes as updated. The name, and where the handles' names
@@ -87,7 +88,8 @@ class SessionLoader {
       std::function<absl::StatusOr<SessionRecord>(SessionRecord record, const StoredMesh& mesh)>;
   using ViewCallback = StoreSync::ViewCallback;
   void Update(const std::string& id, const std::string& etag, const Change& change,
-              CancelFlag cancelled, const ViewCallback& done, TellSession tell = {});
+              CancelFlag cancelled, const ViewCallback& done,
+              SessionProgressCallback on_progress = {});
 
   // Answers the callers of Create and Open that gave this flag and still wait: Cancelled. What is
   // made for no other caller stops at its next stage.
@@ -106,7 +108,7 @@ class SessionLoader {
   struct Waiter {
     CancelFlag cancelled;
     SessionCallback done;
-    TellSession tell;     // may be empty
+    SessionProgressCallback on_progress;  // may be empty
     bool claims = false;  // a successful answer is one more claim on a session that is loaded
   };
   // What is created or loaded.
@@ -127,10 +129,10 @@ class SessionLoader {
   // The caller for which a session is made.
   struct Caller {
     Cancellation cancellation;
-    TellSession tell;  // may be empty
+    SessionProgressCallback on_progress;  // may be empty
 
-    void Tell(SessionStage stage) const {
-      if (tell) tell({stage});
+    void Report(SessionStage stage) const {
+      if (on_progress) on_progress({stage});
     }
   };
   // What became of a call when it arrived: one of these, or it waits.
@@ -140,7 +142,8 @@ class SessionLoader {
     std::optional<SessionProgress> joined = std::nullopt;  // how far that flight is
   };
 
-  Waiter MakeWaiter(CancelFlag cancelled, const SessionCallback& done, const TellSession& tell);
+  Waiter MakeWaiter(CancelFlag cancelled, const SessionCallback& done,
+                    const SessionProgressCallback& on_progress);
   void CreateKnown(SessionRecord record, const std::shared_ptr<const StoredMesh>& mesh,
                    const Waiter& waiter);
   void MakeRoom();

@@ -37,12 +37,13 @@ SessionProgress ToSessionProgress(const PreparationProgress& progress) {
 
 struct ProgressFeed::Follower {
   size_t topic = 0;
-  TellSession tell;
+  SessionProgressCallback on_progress;
 };
 
-std::shared_ptr<const ProgressFeed::Follower> ProgressFeed::Follow(size_t topic, TellSession tell) {
-  if (!tell) return nullptr;
-  auto follower = std::make_shared<const Follower>(Follower{topic, std::move(tell)});
+std::shared_ptr<const ProgressFeed::Follower> ProgressFeed::Follow(
+    size_t topic, SessionProgressCallback on_progress) {
+  if (!on_progress) return nullptr;
+  auto follower = std::make_shared<const Follower>(Follower{topic, std::move(on_progress)});
   std::optional<SessionProgress> so_far;
   {
     MutexLock lock(mutex_);
@@ -50,7 +51,7 @@ std::shared_ptr<const ProgressFeed::Follower> ProgressFeed::Follow(size_t topic,
     followers_.push_back(follower);
     if (topic_ == topic) so_far = newest_;
   }
-  if (so_far.has_value()) follower->tell(*so_far);
+  if (so_far.has_value()) follower->on_progress(*so_far);
   return follower;
 }
 
@@ -60,7 +61,7 @@ void ProgressFeed::Begin(size_t topic) {
   newest_.reset();
 }
 
-void ProgressFeed::Tell(const SessionProgress& progress) {
+void ProgressFeed::Report(const SessionProgress& progress) {
   std::vector<std::shared_ptr<const Follower>> listening;
   {
     MutexLock lock(mutex_);
@@ -73,7 +74,7 @@ void ProgressFeed::Tell(const SessionProgress& progress) {
     }
   }
   // Without the lock: a follower may call back into code that takes it.
-  for (const auto& follower : listening) follower->tell(progress);
+  for (const auto& follower : listening) follower->on_progress(progress);
 }
 
 void ProgressFeed::End() {
@@ -86,13 +87,13 @@ void ProgressPace::Offer(const SessionProgress& progress) {
 }
 
 std::optional<SessionProgress> ProgressPace::Take() {
-  if (!newest_.has_value() || newest_ == told_) return std::nullopt;
+  if (!newest_.has_value() || newest_ == reported_) return std::nullopt;
   const Clock::TimePoint now = clock_->Now();
-  const bool same_stage = told_.has_value() && told_->stage == newest_->stage;
-  if (same_stage && now - told_at_ < kInterval) return std::nullopt;
-  told_ = newest_;
-  told_at_ = now;
-  return told_;
+  const bool same_stage = reported_.has_value() && reported_->stage == newest_->stage;
+  if (same_stage && now - reported_at_ < kInterval) return std::nullopt;
+  reported_ = newest_;
+  reported_at_ = now;
+  return reported_;
 }
 
 }  // namespace tissueform

@@ -42,23 +42,23 @@ SessionProgress ToSessionProgress(const PreparationProgress& progress);
 
 // Called from any thread, also when its client no longer listens: short, and it must not block. May
 // be empty.
-using TellSession = std::function<void(const SessionProgress& progress)>;
+using SessionProgressCallback = std::function<void(const SessionProgress& progress)>;
 
 // From what is made in one place to all who wait for it. One thing is made at a time; each has a
 // topic, a number by which those who wait say what they wait for.
 //
-// Begin, Tell and End by one thread at a time; Follow from any.
+// Begin, Report and End by one thread at a time; Follow from any.
 class ProgressFeed {
  public:
   struct Follower;
 
   // Hears of the topic for as long as the result lives, and at once how far it is where it is being
-  // made. Null where `tell` is empty.
-  std::shared_ptr<const Follower> Follow(size_t topic, TellSession tell);
+  // made. Null where `on_progress` is empty.
+  std::shared_ptr<const Follower> Follow(size_t topic, SessionProgressCallback on_progress);
 
   void Begin(size_t topic);
   // Followers only receive it between Begin and End.
-  void Tell(const SessionProgress& progress);
+  void Report(const SessionProgress& progress);
   void End();
 
  private:
@@ -87,8 +87,8 @@ class ProgressPace {
  private:
   const Clock* const clock_;
   std::optional<SessionProgress> newest_;
-  std::optional<SessionProgress> told_;
-  Clock::TimePoint told_at_;
+  std::optional<SessionProgress> reported_;
+  Clock::TimePoint reported_at_;
 };
 
 }  // namespace tissueform

@@ -153,8 +153,8 @@ class SessionTable {
   // ResourceExhausted.
   absl::Status CheckUpdate(const std::string& id) const;
 
-  // The session that this request has created or is creating; its key tells another request of the
-  // same id.
+  // The session that this request has created or is creating; its key distinguishes another request
+  // with the same id.
   struct EarlierRequest {
     std::string session_id;
     RequestKey key;

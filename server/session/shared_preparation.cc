@@ -95,8 +95,8 @@ int64_t SharedPreparation::BytesBesideFactor(const DeformerOptions& options) con
 absl::StatusOr<std::unique_ptr<Deformer>> SharedPreparation::MakeModel(
     const DeformerOptions& options, const Cancellation& cancellation) {
   // First an upper bound of what the model takes beside its factor; the factor comes on top,
-  // through the admission, as soon as its analysis has told its bytes; at the end Settle gives back
-  // what was too much.
+  // through the admission, as soon as its analysis has reported its bytes; at the end Settle gives
+  // back what was too much.
   feed_.Begin(TopicOf(options.model));
   const absl::Cleanup end_of_topic = [this] { feed_.End(); };
   TF_RETURN_IF_ERROR(cancellation.Check());
@@ -173,18 +173,18 @@ std::shared_ptr<const BandColumns> SharedPreparation::FindBand(
   return nullptr;
 }
 
-std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(DeformationModel model,
-                                                                        TellSession tell) {
-  return feed_.Follow(TopicOf(model), std::move(tell));
+std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(
+    DeformationModel model, SessionProgressCallback on_progress) {
+  return feed_.Follow(TopicOf(model), std::move(on_progress));
 }
 
 std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(
-    const ResponseRequest& request, TellSession tell) {
-  return feed_.Follow(TopicOf(request), std::move(tell));
+    const ResponseRequest& request, SessionProgressCallback on_progress) {
+  return feed_.Follow(TopicOf(request), std::move(on_progress));
 }
 
 PreparationObserver SharedPreparation::Observer() {
-  return [this](const PreparationProgress& progress) { feed_.Tell(ToSessionProgress(progress)); };
+  return [this](const PreparationProgress& progress) { feed_.Report(ToSessionProgress(progress)); };
 }
 
 absl::Status SharedPreparation::Admit(int64_t more_bytes) {

@@ -92,10 +92,11 @@ class SharedPreparation {
       const Cancellation& cancellation);
 
   // Hears how far it is for as long as the result lives, while MakeModel makes what the model
-  // needs, or PrepareResponse these answers, for any caller. Null where `tell` is empty.
-  std::shared_ptr<const ProgressFeed::Follower> Follow(DeformationModel model, TellSession tell);
+  // needs, or PrepareResponse these answers, for any caller. Null where `on_progress` is empty.
+  std::shared_ptr<const ProgressFeed::Follower> Follow(DeformationModel model,
+                                                       SessionProgressCallback on_progress);
   std::shared_ptr<const ProgressFeed::Follower> Follow(const ResponseRequest& request,
-                                                       TellSession tell);
+                                                       SessionProgressCallback on_progress);
 
   // On the strand. MeshPreparation::node_order, for a record. REQUIRES: Begin succeeded.
   const std::vector<int32_t>& node_order() const { return preparation_->node_order(); }

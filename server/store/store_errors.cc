@@ -146,7 +146,7 @@ absl::Status CheckPrediction(const PredictionRecord& record, const std::string& 
 
 absl::Status HidingDatabase(absl::Status status, absl::string_view sentence) {
   const absl::StatusCode code = status.code();
-  return TellingClients(std::move(status), sentence.empty() ? SentenceOf(code) : sentence);
+  return WithClientMessage(std::move(status), sentence.empty() ? SentenceOf(code) : sentence);
 }
 
 int64_t SystemUnixSeconds() {

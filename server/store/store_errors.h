@@ -35,8 +35,8 @@ absl::Status BadLimit(int limit);                                     // Invalid
 absl::Status CheckMeshName(absl::string_view sha256);                 // InvalidArgument: no SHA-256
 absl::Status Damaged(absl::string_view what, absl::string_view why);  // DataLoss
 
-// TellingClients for a database that several servers share, whose address the message contains. The
-// sentence follows from the code where none is given.
+// WithClientMessage for a database that several servers share, whose address the message contains.
+// The sentence follows from the code where none is given.
 absl::Status HidingDatabase(absl::Status status, absl::string_view sentence = "");
 
 }  // namespace tissueform

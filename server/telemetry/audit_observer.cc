@@ -70,7 +70,7 @@ AuditObserver::AuditObserver(AuditLog* log, std::function<absl::Time()> now)
 
 AuditObserver::~AuditObserver() {
   MutexLock lock(mutex_);
-  TellUntoldRefused(now_());
+  WriteSkippedRefusals(now_());
 }
 
 absl::Status AuditObserver::OnBegin(const ObservedCall& call) {
@@ -90,7 +90,7 @@ void AuditObserver::OnResource(const ObservedCall& call) {
 void AuditObserver::OnEnd(const ObservedCall& call, const absl::Status& outcome,
                           std::chrono::steady_clock::duration elapsed) {
   if (IsLeftOut(call.method)) return;
-  if (!call.served && !MayTellRefused()) return;
+  if (!call.served && !MayWriteRefusal()) return;
   const char* const event = !call.served ? "refused" : IsStream(call.method) ? "close" : "call";
   Json line = CallEvent(event, now_(), call);
   AddOutcome(outcome, elapsed, &line);
@@ -101,26 +101,26 @@ void AuditObserver::OnEnd(const ObservedCall& call, const absl::Status& outcome,
   }
 }
 
-bool AuditObserver::MayTellRefused() {
+bool AuditObserver::MayWriteRefusal() {
   const absl::Time now = now_();
   MutexLock lock(mutex_);
   if (const int64_t second = absl::ToUnixSeconds(now); second != second_) {
-    TellUntoldRefused(now);
+    WriteSkippedRefusals(now);
     second_ = second;
-    told_ = 0;
+    written_ = 0;
   }
-  if (told_ < kRefusedLinesASecond) {
-    ++told_;
+  if (written_ < kRefusedLinesASecond) {
+    ++written_;
     return true;
   }
-  ++untold_;
+  ++skipped_;
   return false;
 }
 
-void AuditObserver::TellUntoldRefused(absl::Time now) {
-  if (untold_ == 0) return;
+void AuditObserver::WriteSkippedRefusals(absl::Time now) {
+  if (skipped_ == 0) return;
   Json line = Event("refused_more", now);
-  line["count"] = std::exchange(untold_, 0);
+  line["count"] = std::exchange(skipped_, 0);
   log_->WriteIfRoom(TextOf(line));
 }
 

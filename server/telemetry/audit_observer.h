@@ -53,8 +53,8 @@ class AuditObserver final : public CallObserver {
   bool IsLeftOut(std::string_view method) const { return left_out_.contains(method); }
   bool IsStream(std::string_view method) const { return streams_.contains(method); }
   // Whether one more refused call gets a line of its own.
-  bool MayTellRefused() ABSL_LOCKS_EXCLUDED(mutex_);
-  void TellUntoldRefused(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool MayWriteRefusal() ABSL_LOCKS_EXCLUDED(mutex_);
+  void WriteSkippedRefusals(absl::Time now) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   AuditLog* const log_;
   const std::function<absl::Time()> now_;
@@ -63,8 +63,8 @@ class AuditObserver final : public CallObserver {
 
   Mutex mutex_;
   int64_t second_ ABSL_GUARDED_BY(mutex_) = 0;  // of the last refused call
-  int told_ ABSL_GUARDED_BY(mutex_) = 0;        // in that second
-  int64_t untold_ ABSL_GUARDED_BY(mutex_) = 0;
+  int written_ ABSL_GUARDED_BY(mutex_) = 0;     // in that second
+  int64_t skipped_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace tissueform

@@ -28,16 +28,16 @@ class SessionEventCounts {
   std::atomic<int64_t> counts_[4] = {};
 };
 
-// The page tells what these keep; all must outlive it.
+// The page reports what these keep; all must outlive it.
 void AddFrameMetrics(const FrameMeasures& measures, MetricsPage* page);
 void AddLaneMetrics(const WorkerPool& pool, MetricsPage* page);
 void AddSessionMetrics(const SessionRegistry& registry, const SessionEventCounts& events,
                        MetricsPage* page);
 void AddMemoryMetrics(const MemoryBudget& budget, const MeshCatalog& catalog, MetricsPage* page);
-// Of a store on a disk or in a database; of one in memory there is nothing to tell.
+// Of a store on a disk or in a database; of one in memory there is nothing to report.
 void AddStoreMetrics(const Stores& stores, MetricsPage* page);
 
-// What TLS and logins tell of themselves; a reading that is null is left out.
+// What TLS and logins report about themselves; a reading that is null is left out.
 struct SecurityReadings {
   bool insecure = false;                            // started with --insecure
   MetricsPage::Read certificate_expires = nullptr;  // the server's own, in Unix time

@@ -11,7 +11,7 @@
 
 namespace tissueform {
 
-// What a server tells who operates it, and where.
+// What a server reports to its operator, and where.
 struct TelemetryOptions {
   int metrics_port = -1;  // of loopback; 0: any free one; -1: no metrics
   std::string log_format = "text";

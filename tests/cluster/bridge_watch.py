@@ -112,7 +112,7 @@ class Planner:
 
 def watched(cluster):
     """The server on which the bridge hears of exports: of all calls through HAProxy its watch alone lasts."""
-    found = re.findall(r"be=servers srv=(\S+)", balancer.tell(cluster, "show sess") or "")
+    found = re.findall(r"be=servers srv=(\S+)", balancer.send_command(cluster, "show sess") or "")
     return found[0] if len(found) == 1 else None
 
 

@@ -23,7 +23,7 @@ CODES = {code.value[0]: code for code in grpc.StatusCode}
 
 
 class WebError(grpc.RpcError):
-    """The end of a call as gRPC's own client would tell it."""
+    """The end of a call as gRPC's own client would report it."""
 
     def __init__(self, code, text, status_details=b""):
         super().__init__(text)

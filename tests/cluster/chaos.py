@@ -22,7 +22,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 for folder in ("deploy/cluster", "tests/integration"):
     sys.path.append(str(ROOT / folder))
 SKIPPED = 77
-os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a proxy's own errors are no gRPC, of which its log would tell each
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")  # a proxy's own errors are no gRPC, of which its log would report each
 
 import stack  # noqa: E402 (after the paths)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Drags and followers of a cluster, which go on whatever happens to it, and tell a ledger what they saw."""
+"""Drags and followers of a cluster, which go on whatever happens to it, and report to a ledger what they saw."""
 
 import contextlib
 import itertools
@@ -35,7 +35,7 @@ def shift_mm(sequence):
 
 
 class Drag(threading.Thread):
-    """Drags one session at 20 poses per second until it is told to stop. With a node it goes there alone, and never elsewhere."""
+    """Drags one session at 20 poses per second until it is stopped. With a node it goes there alone, and never elsewhere."""
 
     def __init__(self, address, session, handle_rest, ledger, node=None, sequences=None):
         super().__init__(daemon=True)
@@ -69,8 +69,8 @@ class Drag(threading.Thread):
 
     def state(self):
         stream = self.stream
-        told = "none" if stream is None else f"{time.monotonic() - stream.begun_at:.1f} s old, from {stream.node or 'nobody'}, {'' if stream.started else 'not '}started"
-        return f"stream {self.streams}: {told}; sent to {self.route.node or 'any server'}"
+        description = "none" if stream is None else f"{time.monotonic() - stream.begun_at:.1f} s old, from {stream.node or 'nobody'}, {'' if stream.started else 'not '}started"
+        return f"stream {self.streams}: {description}; sent to {self.route.node or 'any server'}"
 
     def _one_stream(self):
         from tissueform.v1 import deform_service_pb2 as protocol
@@ -160,7 +160,7 @@ class Stream:
 
 
 class Follower(threading.Thread):
-    """Follows a session until it is told to stop."""
+    """Follows a session until it is stopped."""
 
     def __init__(self, address, session, ledger):
         super().__init__(daemon=True)

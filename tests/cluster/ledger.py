@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""What clients of a cluster were told, and what that forbids from then on. Any thread."""
+"""What clients of a cluster received, and what that forbids from then on. Any thread."""
 
 import collections
 import threading

@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""`tissueform load --cluster` beside the strangers: drags and followers by client/cpp, which must not tell of one error."""
+"""`tissueform load --cluster` beside the strangers: drags and followers by client/cpp, which must not report one error."""
 
 import json
 import subprocess

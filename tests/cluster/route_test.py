@@ -24,7 +24,7 @@ CODES = [grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED, grpc.StatusCode
 
 class Error:
     def __init__(self, code, reason, node=""):
-        self.told = (code, reason, {"node": node} if node else {})
+        self.why = (code, reason, {"node": node} if node else {})
 
     @staticmethod
     def details():
@@ -35,7 +35,7 @@ class Pace(unittest.TestCase):
     def setUp(self):
         self.now = 100.0
         self.route = stranger.Route("0123456789abcdef")
-        for patch in (mock.patch.object(stranger, "why", lambda error: error.told), mock.patch.object(stranger.time, "monotonic", lambda: self.now)):
+        for patch in (mock.patch.object(stranger, "why", lambda error: error.why), mock.patch.object(stranger.time, "monotonic", lambda: self.now)):
             patch.start()
             self.addCleanup(patch.stop)
 

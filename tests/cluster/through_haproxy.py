@@ -116,8 +116,8 @@ def check_refusals(channel):
                 answer = send(iter(messages), timeout=stranger.ATTEMPT_S, metadata=metadata)
                 raise SystemExit(f"{kind} was answered with {answer}")
             except grpc.RpcError as error:
-                told = status_pb2.Status.FromString(dict(error.trailing_metadata() or ()).get("grpc-status-details-bin", b""))
-                if told.code != code.value[0] or not told.message or stranger.why(error)[1] != reason:
+                details = status_pb2.Status.FromString(dict(error.trailing_metadata() or ()).get("grpc-status-details-bin", b""))
+                if details.code != code.value[0] or not details.message or stranger.why(error)[1] != reason:
                     raise SystemExit(f"{kind} was refused without the server's words: {error}") from None
     print(f"{len(kinds) * REFUSALS} refusals came with the server's words", flush=True)
 
@@ -234,8 +234,8 @@ def check_keys(cluster, channel):
         if codes != {grpc.StatusCode.NOT_FOUND: KEYS}:
             raise SystemExit(f"not every key was answered as one that nobody has: {codes}")
         grown = {name: (memory_bytes(cluster.process(name)) - before[name]) / KEYS for name in WATCHED}
-        told = (f"{name} {before[name] >> 10} KiB and {grown[name]:.0f} bytes for each" for name in WATCHED)
-        print(f"{KEYS} keys: {', '.join(told)}", flush=True)
+        growths = (f"{name} {before[name] >> 10} KiB and {grown[name]:.0f} bytes for each" for name in WATCHED)
+        print(f"{KEYS} keys: {', '.join(growths)}", flush=True)
         if turn > 0 and max(grown.values()) < MOST_BYTES_A_KEY:
             return
     raise SystemExit("something is kept of each")

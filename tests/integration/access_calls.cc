@@ -20,7 +20,7 @@ namespace {
 using Kind = AccessWorld::Kind;
 
 template <typename Response>
-Answer Told(const grpc::Status& status, const Response& response) {
+Answer AnswerOf(const grpc::Status& status, const Response& response) {
   return {status, response.SerializeAsString()};
 }
 
@@ -29,7 +29,7 @@ template <typename Response>
 Answer ReadAll(std::unique_ptr<grpc::ClientReader<Response>> reader) {
   Answer answer;
   Response message;
-  while (reader->Read(&message)) answer.told += message.SerializeAsString();
+  while (reader->Read(&message)) answer.messages += message.SerializeAsString();
   answer.status = reader->Finish();
   return answer;
 }
@@ -53,7 +53,7 @@ Answer Drag(const Stubs& stubs, grpc::ClientContext* context, const std::string&
   stream->WritesDone();
   Answer answer;
   v1::DeformResponse message;
-  while (stream->Read(&message)) answer.told += message.SerializeAsString();
+  while (stream->Read(&message)) answer.messages += message.SerializeAsString();
   answer.status = stream->Finish();
   return answer;
 }
@@ -85,7 +85,7 @@ Answer DeformOne(const Stubs& stubs, grpc::ClientContext* context, const std::st
   request.set_session(name);
   AddRest(request.mutable_poses());
   v1::DeformOnceResponse response;
-  return Told(stubs.deform->DeformOnce(context, request, &response), response);
+  return AnswerOf(stubs.deform->DeformOnce(context, request, &response), response);
 }
 
 Answer FitNothing(const Stubs& stubs, grpc::ClientContext* context, const std::string& name) {
@@ -100,7 +100,7 @@ Answer FitNothing(const Stubs& stubs, grpc::ClientContext* context, const std::s
   freedom->mutable_translation_mm()->mutable_x()->set_lowest(-1);
   freedom->mutable_translation_mm()->mutable_x()->set_highest(1);
   v1::FitResponse response;
-  return Told(stubs.plans->Fit(context, request, &response), response);
+  return AnswerOf(stubs.plans->Fit(context, request, &response), response);
 }
 
 // Of a version that never was: changes nothing.
@@ -109,7 +109,7 @@ Answer UpdateStale(const Stubs& stubs, grpc::ClientContext* context, const std::
   request.set_etag("none");
   request.set_poisson_ratio(0.3);
   v1::Session response;
-  return Told(stubs.sessions->UpdateSession(context, request, &response), response);
+  return AnswerOf(stubs.sessions->UpdateSession(context, request, &response), response);
 }
 
 Answer Prepare(const Stubs& stubs, grpc::ClientContext* context, const std::string& name) {
@@ -129,14 +129,14 @@ Answer Shares(const Stubs& stubs, grpc::ClientContext* context, const std::strin
   v1::ListSharesRequest request;
   request.set_resource(name);
   v1::ListSharesResponse response;
-  return Told(stubs.access->ListShares(context, request, &response), response);
+  return AnswerOf(stubs.access->ListShares(context, request, &response), response);
 }
 
 // gRPC's generated methods, all of one form.
-#define TF_UNARY(service, method, Request, Response)                                         \
-  [](const Stubs& stubs, grpc::ClientContext* context, const std::string& name) {            \
-    Response response;                                                                       \
-    return Told(stubs.service->method(context, Naming<Request>(name), &response), response); \
+#define TF_UNARY(service, method, Request, Response)                                             \
+  [](const Stubs& stubs, grpc::ClientContext* context, const std::string& name) {                \
+    Response response;                                                                           \
+    return AnswerOf(stubs.service->method(context, Naming<Request>(name), &response), response); \
   }
 #define TF_READ(service, method, Request)                                         \
   [](const Stubs& stubs, grpc::ClientContext* context, const std::string& name) { \
@@ -241,7 +241,7 @@ Answer SendMesh(const Stubs& stubs, const AccessWorld::Caller& caller, const Sen
   stream->Write(request);
   stream->WritesDone();
   const grpc::Status status = stream->Finish();
-  return Told(status, *response);
+  return AnswerOf(status, *response);
 }
 
 Answer SendCase(const Stubs& stubs, const AccessWorld::Caller& caller, const std::string& bytes,
@@ -259,7 +259,7 @@ Answer SendCase(const Stubs& stubs, const AccessWorld::Caller& caller, const std
   stream->Write(request);
   stream->WritesDone();
   const grpc::Status status = stream->Finish();
-  return Told(status, *response);
+  return AnswerOf(status, *response);
 }
 
 namespace {
@@ -275,7 +275,7 @@ Answer ListPages(const AccessWorld::Caller& caller, Call call, Items items,
     const auto context = ContextOf(caller);
     answer.status = call(context.get(), request, &response);
     if (!answer.status.ok()) return answer;
-    answer.told += response.SerializeAsString();
+    answer.messages += response.SerializeAsString();
     for (const auto& item : items(response)) names->push_back(item.name());
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());

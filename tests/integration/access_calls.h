@@ -53,10 +53,10 @@ struct Stubs {
   std::unique_ptr<v1::SessionService::Stub> sessions;
 };
 
-// What a call has ended with, and all that it has told.
+// What a call has ended with, and all messages that it has sent.
 struct Answer {
   grpc::Status status;
-  std::string told;
+  std::string messages;
 };
 
 // A call that looks at one resource and changes nothing.

@@ -146,13 +146,13 @@ class AccessPropertyTest : public ServiceTest {
              const Answer& answer, Code expected, const std::vector<Code>& others = {}) {
     ++calls_;
     const Code code = answer.status.error_code();
-    const bool as_told = code == expected ||
-                         (expected == Code::OK && std::ranges::find(others, code) != others.end());
-    EXPECT_TRUE(as_told) << what << " of " << name << " by " << caller.name << caller.link << ": "
-                         << code << " instead of " << expected << ": "
-                         << answer.status.error_message();
+    const bool as_expected = code == expected || (expected == Code::OK &&
+                                                  std::ranges::find(others, code) != others.end());
+    EXPECT_TRUE(as_expected) << what << " of " << name << " by " << caller.name << caller.link
+                             << ": " << code << " instead of " << expected << ": "
+                             << answer.status.error_message();
     if (IsRefusal(expected)) {
-      EXPECT_EQ(answer.told, "") << what;
+      EXPECT_EQ(answer.messages, "") << what;
     }
   }
 
@@ -514,12 +514,12 @@ class AccessPropertyTest : public ServiceTest {
   void AskAboutOneself() {
     const Caller caller = AnyCaller();
     const bool good = caller.link.empty() || world_.IsGood(caller.link);
-    v1::Caller told;
-    const grpc::Status status = stubs_->access->WhoAmI(ContextOf(caller).get(), {}, &told);
-    Check("WhoAmI", caller, "", {status, told.SerializeAsString()},
+    v1::Caller reported;
+    const grpc::Status status = stubs_->access->WhoAmI(ContextOf(caller).get(), {}, &reported);
+    Check("WhoAmI", caller, "", {status, reported.SerializeAsString()},
           good ? Code::OK : Code::UNAUTHENTICATED);
     if (caller.link.empty()) {
-      EXPECT_EQ(told.principal(), caller.name);
+      EXPECT_EQ(reported.principal(), caller.name);
     }
     v1::ServerInfo info;
     const grpc::Status of_info = stubs_->info->GetServerInfo(ContextOf(caller).get(), {}, &info);

@@ -184,7 +184,7 @@ TEST_F(AccessServiceTest, ALinkLivesAsLongAsItIsAskedForWithinTheServersBounds) 
   EXPECT_EQ(MakeLink(request, &link).error_code(), Code::NOT_FOUND);
 }
 
-TEST_F(AccessServiceTest, SharesAreToldToTheirOwnerAndMustHaveARole) {
+TEST_F(AccessServiceTest, OnlyTheOwnerListsSharesAndSharesMustHaveARole) {
   EXPECT_EQ(Share("bob", v1::SHARE_ROLE_UNSPECIFIED).error_code(), Code::INVALID_ARGUMENT);
   ASSERT_TRUE(Share("bob", v1::SHARE_ROLE_VIEWER).ok());
   v1::ListSharesRequest request;
@@ -211,8 +211,8 @@ TEST_F(AccessServiceTest, AnAdminSeesNumbersOfAllAndContentOfNobody) {
   EXPECT_GT(usage.principals(0).memory_bytes(), 0);
   v1::GetSessionRequest session;
   session.set_name(session_);
-  v1::Session told;
-  EXPECT_EQ(stubs_->sessions->GetSession(ContextOf(admin).get(), session, &told).error_code(),
+  v1::Session found;
+  EXPECT_EQ(stubs_->sessions->GetSession(ContextOf(admin).get(), session, &found).error_code(),
             Code::NOT_FOUND);
   EXPECT_EQ(stubs_->access->GetUsage(ContextOf(bob_).get(), request, &usage).error_code(),
             Code::PERMISSION_DENIED);

@@ -212,9 +212,9 @@ def look_at_bridge(program, folder):
 
 def ask_review_page(address, user, password):
     """The status of the page's answer."""
-    told = base64.b64encode(f"{user}:{password}".encode()).decode()
+    credentials = base64.b64encode(f"{user}:{password}".encode()).decode()
     try:
-        return urllib.request.urlopen(urllib.request.Request(address, headers={"Authorization": f"Basic {told}"}), timeout=PATIENCE_S).status
+        return urllib.request.urlopen(urllib.request.Request(address, headers={"Authorization": f"Basic {credentials}"}), timeout=PATIENCE_S).status
     except urllib.error.HTTPError as error:
         return error.code
 
@@ -259,9 +259,9 @@ def look_at_refusals(programs, folder):
 
 
 def journal_entries():
-    told = subprocess.run(["journalctl", "--directory", "/run/log/journal", "--identifier", "tissueform-server-audit", "--output", "json", "--no-pager"],
+    output = subprocess.run(["journalctl", "--directory", "/run/log/journal", "--identifier", "tissueform-server-audit", "--output", "json", "--no-pager"],
                           capture_output=True, text=True, check=True).stdout
-    return [json.loads(line) for line in told.splitlines()]
+    return [json.loads(line) for line in output.splitlines()]
 
 
 def start_journald():

@@ -107,14 +107,14 @@ class Haproxy:
         self.unary = self.channel.unary_unary("/test.Test/Call")
         self.stream = self.channel.stream_stream("/test.Test/Stream")
 
-    def tell(self, words):
+    def send_command(self, words):
         with socket.socket(socket.AF_UNIX) as connection:
             connection.connect(self.socket)
             connection.sendall(words.encode() + b"\n")
             return b"".join(iter(lambda: connection.recv(1 << 16), b"")).decode()
 
     def states(self):
-        lines = [line.split(",") for line in self.tell("show stat").splitlines()]
+        lines = [line.split(",") for line in self.send_command("show stat").splitlines()]
         return {line[1]: line[17] for line in lines if line[0] == "servers"}
 
     def wait(self, name, state):
@@ -252,10 +252,10 @@ def check_drain(haproxy, nodes):
     expect([each.decode() for each in stream] == [node.name], "its streams go on until it ends them")
     node.health = SERVING
     haproxy.wait(node.name, "UP")
-    haproxy.tell(f"set server servers/{node.name} state drain")
+    haproxy.send_command(f"set server servers/{node.name} state drain")
     expect(node.name not in ask_all(haproxy, [f"told-{i}" for i in range(60)]).values(), "nor when the operator says so")
     expect(haproxy.ask(node=node.name) == node.name, "who holds a session there still finds it")
-    haproxy.tell(f"set server servers/{node.name} state ready")
+    haproxy.send_command(f"set server servers/{node.name} state ready")
 
 
 def check_gateway(program, haproxy, nodes):
@@ -304,7 +304,7 @@ def check_stalled(gateway, node):
 
 def check_added(haproxy, node):
     server = f"servers/{node.name}"
-    haproxy.tell(f"add server {server} 127.0.0.1:{node.port} id 9 proto h2 check inter 500ms fastinter 200ms fall 2 rise 1;"
+    haproxy.send_command(f"add server {server} 127.0.0.1:{node.port} id 9 proto h2 check inter 500ms fastinter 200ms fall 2 rise 1;"
                  f"enable health {server}; enable server {server}")
     haproxy.wait(node.name, "UP")
     expect(haproxy.ask(node=node.name) == node.name, "a server that is added has its header")
@@ -325,7 +325,7 @@ def check_half_open(haproxy):
 def check_nobody(haproxy):
     for name in haproxy.states():
         if name != "BACKEND":
-            haproxy.tell(f"disable server servers/{name}")
+            haproxy.send_command(f"disable server servers/{name}")
     try:
         haproxy.unary(b"", timeout=PATIENCE_S)
         expect(False, "nobody answers")
@@ -362,7 +362,7 @@ def main():
                 haproxy.wait(name, "UP")
             expect(True, "tissueform-server is up by its health")
             check_hung(haproxy, server, "real")
-            haproxy.tell("disable server servers/real")
+            haproxy.send_command("disable server servers/real")
             first = check_sessions(haproxy, nodes, [f"{i:032x}" for i in range(120)])
             check_header(haproxy, nodes)
             check_death(haproxy, nodes, first)

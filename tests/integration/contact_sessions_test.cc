@@ -211,7 +211,7 @@ TEST_F(ContactSessionsTest, SessionsWithAndWithoutRowsShareNothing) {
   EXPECT_EQ(Answer(client.get(), other, pose), Float32Bytes(Solve(sticking, pose).positions));
 }
 
-TEST_F(ContactSessionsTest, PredictionsTellRecipesWithOtherRowsApart) {
+TEST_F(ContactSessionsTest, PredictionsDistinguishRecipesWithOtherRows) {
   const auto client = Connect();
   std::vector<std::string> recipes;
   for (const auto& rows : {block_.rows, std::vector<ContactRow>{}, block_.rows}) {
@@ -275,7 +275,7 @@ TEST_F(ContactSessionsTest, SealedLipsAreThoseOfThisProcessAndFreeOnesStayFree) 
   EXPECT_GT(sealed_by_mm, 0.1);
 }
 
-TEST_F(ContactSessionsTest, PredictionsTellSealedLipsFromFreeOnes) {
+TEST_F(ContactSessionsTest, PredictionsDistinguishSealedLipsFromFreeOnes) {
   const auto client = Connect();
   std::vector<std::string> recipes;
   for (const PlanProblem& problem : {Problem(block_.rows), SealProblem(false), SealProblem(true)}) {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kModulesMissing = 77;
 
-// So coarse that some skin is missing. The tolerance stands for two ways of telling which air is
+// So coarse that some skin is missing. The tolerance stands for two ways of deciding which air is
 // outside, on two grids: both find 99.6 %, and 0.05 % lie between them.
 constexpr char kRecipe[] = R"({"format": "tissueform-recipe", "version": 1,
     "ct": {"hu_offset": -1024, "axes": "RPI"}, "spacing_mm": 2.5,

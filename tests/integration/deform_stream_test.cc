@@ -183,7 +183,7 @@ TEST_F(DeformStreamTest, AfterTheClientClosesTheLastPoseNeedsNoCredit) {
   EXPECT_THAT(stream->Finish(), IsOk());
 }
 
-TEST_F(DeformStreamTest, SendingAfterTheEndIsTold) {
+TEST_F(DeformStreamTest, SendingAfterTheEndFails) {
   const auto stream = Open();
   stream->CloseSending();
   EXPECT_THAT(stream->SendPoses(1, TopPose(SomePose(1))),

@@ -75,18 +75,18 @@ def main():
     demo = subprocess.Popen([program, "demo", "--serve", "--seconds", "0.3", "--out", out], stdout=subprocess.PIPE, text=True)
     patience = threading.Timer(PATIENCE_S, demo.kill)
     patience.start()
-    told = ""
+    output = ""
     address = None
     try:
         for line in demo.stdout:
-            told += line
+            output += line
             address = re.match(r"the planner, in a browser: (\S+)", line)
             if address is not None or line.startswith("no planner: "):
                 break
         if address is None:
-            sys.exit(f"no address: {told}")
-        if f"port {DEFAULT_PORT} is in use; the planner uses a free one" not in told:
-            sys.exit(f"the demo does not say that its port is taken: {told}")
+            sys.exit(f"no address: {output}")
+        if f"port {DEFAULT_PORT} is in use; the planner uses a free one" not in output:
+            sys.exit(f"the demo does not say that its port is taken: {output}")
         check_planner(address.group(1))
     finally:
         demo.send_signal(signal.SIGINT)
@@ -95,7 +95,7 @@ def main():
         if listener is not None:
             listener.close()
     if demo.returncode != 0:
-        sys.exit(f"the demo ended with {demo.returncode}: {told}")
+        sys.exit(f"the demo ended with {demo.returncode}: {output}")
 
 
 if __name__ == "__main__":

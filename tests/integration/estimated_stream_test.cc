@@ -66,7 +66,7 @@ class EstimatedStreamTest : public ServiceTest {
   v1::Session session_;
 };
 
-TEST_F(EstimatedStreamTest, SettingsAreToldBack) {
+TEST_F(EstimatedStreamTest, TheSessionReturnsItsSettings) {
   EXPECT_EQ(session_.gradient_field().rotation_mode(), v1::ROTATION_MODE_ESTIMATED);
   EXPECT_EQ(session_.gradient_field().max_iterations(), 200);
   EXPECT_EQ(session_.gradient_field().tolerance_mm(), kToleranceMm);

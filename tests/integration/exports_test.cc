@@ -139,7 +139,7 @@ TEST_F(ExportsTest, OneOfAPredictionThatIsNotDoneIsGivenAgainAndADoneOneIsNot) {
   EXPECT_THAT(of_case, IsEmpty());
 }
 
-TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
+TEST_F(ExportsTest, ErrorsNameThePlaceOfBadMeasuresWithoutTheirText) {
   const std::string prediction = Predict();
   const auto refused = [&](const v1::Measure& measure, const std::string& why) {
     const absl::Status status = exports().Create(prediction, {SomeMeasure(), measure}).status();
@@ -185,32 +185,32 @@ TEST_F(ExportsTest, BadRequestsAreToldByTheirPlaceAndWithoutTheirText) {
   }
 }
 
-TEST_F(ExportsTest, AWatchTellsWhatWaitsThenEveryChangeAndEndsWithTheServer) {
+TEST_F(ExportsTest, AWatchSendsWaitingExportsThenEveryChangeAndEndsWithTheServer) {
   ASSERT_OK_AND_ASSIGN(const v1::Export done, exports().Create(Predict(1)));
   ASSERT_THAT(exports().Update(Change(done.name(), v1::EXPORT_STATE_STORED)), IsOk());
   ASSERT_OK_AND_ASSIGN(const v1::Export waiting, exports().Create(Predict(2)));
   const auto watch = exports().Watch();
-  auto told = watch->Receive();
-  ASSERT_TRUE(told.has_value());
-  EXPECT_EQ(told->export_().name(), waiting.name());
-  told = watch->Receive();
-  ASSERT_TRUE(told.has_value());
-  EXPECT_FALSE(told->has_export_()) << "that was all";
+  auto received = watch->Receive();
+  ASSERT_TRUE(received.has_value());
+  EXPECT_EQ(received->export_().name(), waiting.name());
+  received = watch->Receive();
+  ASSERT_TRUE(received.has_value());
+  EXPECT_FALSE(received->has_export_()) << "that was all";
   ASSERT_THAT(exports().Update(Change(waiting.name(), v1::EXPORT_STATE_CONFIRMATION)), IsOk());
-  told = watch->Receive();
-  ASSERT_TRUE(told.has_value());
-  EXPECT_EQ(told->export_().state(), v1::EXPORT_STATE_CONFIRMATION);
+  received = watch->Receive();
+  ASSERT_TRUE(received.has_value());
+  EXPECT_EQ(received->export_().state(), v1::EXPORT_STATE_CONFIRMATION);
   ASSERT_OK_AND_ASSIGN(const v1::Export later, exports().Create(Predict(3)));
-  told = watch->Receive();
-  ASSERT_TRUE(told.has_value());
-  EXPECT_EQ(told->export_().name(), later.name());
+  received = watch->Receive();
+  ASSERT_TRUE(received.has_value());
+  EXPECT_EQ(received->export_().name(), later.name());
   std::thread drain([this] { server().Drain(); });
   EXPECT_EQ(watch->Receive(), std::nullopt);
   EXPECT_THAT(watch->Finish(), Because(ErrorReason::kServerDraining));
   drain.join();
 }
 
-TEST_F(ExportsTest, WhatIsTakenBackOrLosesItsPredictionIsGone) {
+TEST_F(ExportsTest, AnExportThatIsWithdrawnOrLosesItsPredictionIsGone) {
   const std::string prediction = Predict(1);
   ASSERT_OK_AND_ASSIGN(const v1::Export made, exports().Create(prediction));
   EXPECT_THAT(exports().Delete(made.name()), IsOk());

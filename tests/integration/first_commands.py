@@ -61,15 +61,16 @@ def run(folder, programs, port, metrics_port, options=("-euo", "pipefail")):
     # With the options of sanitizers, whose suppressions a program that is started must know.
     sanitizers = {name: value for name, value in os.environ.items() if name.endswith("SAN_OPTIONS")}
     environment = {"PATH": f"{programs}:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": str(folder), "PORT": str(port), "METRICS": str(metrics_port), "LANG": "C.UTF-8", **sanitizers}
-    with open(folder / "told", "w+") as told:
-        shell = subprocess.Popen(["bash", *options, "-c", block()], cwd=folder, env=environment, stdout=told, stderr=subprocess.STDOUT, start_new_session=True)
+    with open(folder / "output", "w+") as output:
+        shell = subprocess.Popen(["bash", *options, "-c", block()], cwd=folder, env=environment, stdout=output, stderr=subprocess.STDOUT,
+                                 start_new_session=True)
         try:
             code = shell.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             os.killpg(shell.pid, signal.SIGKILL)
             raise
-        told.seek(0)
-        return code, told.read()
+        output.seek(0)
+        return code, output.read()
 
 
 def stop(folder):
@@ -81,9 +82,9 @@ def look_at_taken_ports(folder, programs, port, metrics_port):
     """As a script, and as somebody pastes them, where what follows goes on after an error."""
     for taken, options in ((port, ("-euo", "pipefail")), (port, ()), (metrics_port, ("-euo", "pipefail"))):
         with socket.create_server(("127.0.0.1", taken)):
-            code, told = run(folder, programs, port, metrics_port, options)
+            code, output = run(folder, programs, port, metrics_port, options)
         check(code != 0 or not options, f"a taken port ends them ({' '.join(options) or 'pasted'})")
-        check(re.search(rf"cannot listen on 127.0.0.1:{taken}: .*--port|port {taken} .*is not available.*--metrics-port", told), f"they name the port {'PORT' if taken == port else 'METRICS'} and its option")
+        check(re.search(rf"cannot listen on 127.0.0.1:{taken}: .*--port|port {taken} .*is not available.*--metrics-port", output), f"they name the port {'PORT' if taken == port else 'METRICS'} and its option")
 
 
 def look(folder, programs, port, metrics_port, runs):
@@ -91,8 +92,8 @@ def look(folder, programs, port, metrics_port, runs):
     check("token-keys = keys/jwks.json\n" in printed, "the configuration prints as it was given")
     metrics = urllib.request.urlopen(f"http://127.0.0.1:{metrics_port}/metrics", timeout=PATIENCE_S).read().decode()
     check("tissueform_" in metrics, "Prometheus finds metrics")
-    told = printed + metrics + "".join((folder / name).read_text() for name in ("server.log", "server.out"))
-    check(not [secret for secret in secrets(folder) if secret in told], "no secret is in logs, metrics or configuration")
+    exposed = printed + metrics + "".join((folder / name).read_text() for name in ("server.log", "server.out"))
+    check(not [secret for secret in secrets(folder) if secret in exposed], "no secret is in logs, metrics or configuration")
     for name in ("token", "keys/private.pem", "ca.key", "server.key", "data"):
         check((folder / name).stat().st_mode & 0o077 == 0, f"{name} is its owner's alone")
     tls = subprocess.run(["openssl", "s_client", "-connect", f"localhost:{port}", "-CAfile", "ca.pem", "-verify_return_error", "-verify_hostname", "localhost", "-alpn", "h2"],
@@ -111,8 +112,8 @@ def main(programs):
             backups = len(list(folder.glob("backup-*")))
             keys = None
             for again in range(2):
-                code, told = run(folder, programs, port, metrics_port)
-                check(code == 0, f"the commands succeed{' again' if again else ''}" if code == 0 else told)
+                code, output = run(folder, programs, port, metrics_port)
+                check(code == 0, f"the commands succeed{' again' if again else ''}" if code == 0 else output)
                 look(folder, programs, port, metrics_port, backups + again + 1)
                 check(keys in (None, kept_secrets(folder)), "keys are as they were")
                 keys = kept_secrets(folder)

@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Brings bad tokens to a server, so many a second, for as long as it is told; says how many were refused. By hand, beside
+"""Brings bad tokens to a server, so many a second, for a given time; says how many were refused. By hand, beside
 `tissueform load` (docs/performance.md).
 
   flood_with_bad_tokens.py HOST:PORT TOKEN_FILE RATE SECONDS

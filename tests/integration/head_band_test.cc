@@ -38,7 +38,7 @@ class HeadBandTest : public ServiceTest,
     session_ = *PlanSession::Create(client_.get(), problem_);
     options_.model = GetParam();
     options_.vertices = {.kind = AnswerVertices::Kind::kList, .list = SomeSkin(*problem_.mesh)};
-    problem_.deformer.model = DeformationModel::kLinearElastic;  // one that tells of the material
+    problem_.deformer.model = DeformationModel::kLinearElastic;  // one that depends on the material
     options_.prepared = PreparedAnswersOf(problem_);
   }
 

@@ -29,7 +29,7 @@ class LoadCommandTest : public ServedCliTest {
   }
 };
 
-TEST_F(LoadCommandTest, TellsWhatItsDragsGot) {
+TEST_F(LoadCommandTest, ReportsWhatItsDragsReceive) {
   const ProcessResult result = Load({"--sessions", "2", "--refining", "1", "--churn", "1",
                                      "--seconds", "1", "--bare", "--json", "load.json"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -50,7 +50,7 @@ TEST_F(LoadCommandTest, TellsWhatItsDragsGot) {
   EXPECT_GT(json["session_seconds"]["count"], 0);
 }
 
-TEST_F(LoadCommandTest, TellsWhatCameFromOneServerWithoutACluster) {
+TEST_F(LoadCommandTest, ReportsTheAnswersOfOneServerWithoutACluster) {
   const ProcessResult result =
       Load({"--cluster", "--sessions", "2", "--followers", "3", "--commit-seconds", "0.3", "--rate",
             "20", "--seconds", "1", "--json", "cluster.json"});

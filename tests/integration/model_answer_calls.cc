@@ -18,23 +18,24 @@
 namespace tissueform::testing {
 namespace {
 
-absl::Status TakePrediction(ModelState& state, const v1::Prediction& told,
+absl::Status TakePrediction(ModelState& state, const v1::Prediction& reported,
                             ServedPrediction prediction) {
   const std::string& request_id = prediction.request_id;
   if (!request_id.empty()) {
-    const auto [named, first] = state.model.names_of_requests.emplace(request_id, told.name());
-    if (!first && named->second != told.name()) return Wrong("another name of one request");
+    const auto [named, first] = state.model.names_of_requests.emplace(request_id, reported.name());
+    if (!first && named->second != reported.name()) return Wrong("another name of one request");
   }
-  if (told.session() != prediction.session || told.mesh() != NameOfMesh(prediction.key.mesh) ||
-      told.model() != prediction.key.model) {
-    return Wrong(told.DebugString());
+  if (reported.session() != prediction.session ||
+      reported.mesh() != NameOfMesh(prediction.key.mesh) ||
+      reported.model() != prediction.key.model) {
+    return Wrong(reported.DebugString());
   }
-  if (!state.model.predictions.emplace(told.name(), std::move(prediction)).second) {
-    return Wrong(told.name(), " comes again");
+  if (!state.model.predictions.emplace(reported.name(), std::move(prediction)).second) {
+    return Wrong(reported.name(), " comes again");
   }
   TF_ASSIGN_OR_RETURN(const Positions answer,
-                      state.client->predictions().ReadPositions(told.name()));
-  return state.answers.Check(state.model.predictions.at(told.name()).key, answer);
+                      state.client->predictions().ReadPositions(reported.name()));
+  return state.answers.Check(state.model.predictions.at(reported.name()).key, answer);
 }
 
 }  // namespace
@@ -72,16 +73,16 @@ absl::Status DeformOnce(ModelState& state, const Numbers& numbers) {
   ServedSession* session = state.model.Find(name);
   const bool knows_handle = session != nullptr && numbers[3] % 8 != 0;
   const std::string handle = knows_handle ? session->handle() : "nobody";
-  state.Tell("DeformOnce(", name, ", ", handle, ": pose ", pose, ", model ", model, ")");
+  state.Log("DeformOnce(", name, ", ", handle, ": pose ", pose, ", model ", model, ")");
   const bool legal = knows_handle && model != kNoModel;
   Outcome expected = state.model.OfSession(name);
   if (expected.ok() && !legal) expected = kInvalidRequest;
-  const auto told = state.client->DeformOnce(name, {{handle, SomePose(pose)}}, {}, model);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
+  const auto reported = state.client->DeformOnce(name, {{handle, SomePose(pose)}}, {}, model);
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
   if (session != nullptr) session->ready = true;
-  if (!told.ok()) return absl::OkStatus();
+  if (!reported.ok()) return absl::OkStatus();
   TF_ASSIGN_OR_RETURN(const Positions answer,
-                      DecodePositions(told->positions(), MeshOfModel(0).mesh.num_vertices()));
+                      DecodePositions(reported->positions(), MeshOfModel(0).mesh.num_vertices()));
   return state.answers.Check(KeyOf(*session, model, pose), answer);
 }
 
@@ -90,7 +91,7 @@ absl::Status Drag(ModelState& state, const Numbers& numbers) {
   std::vector<int> poses;
   for (uint32_t i = 0; i < 1 + numbers[1] % 4; ++i) poses.push_back(SomePoseNumber(numbers[2] + i));
   const uint32_t commits = numbers[3] & ((1U << poses.size()) - 1);
-  state.Tell("Deform(", name, ", poses ", absl::StrJoin(poses, " "), ", commits ", commits, ")");
+  state.Log("Deform(", name, ", poses ", absl::StrJoin(poses, " "), ", commits ", commits, ")");
   ServedSession* session = state.model.Find(name);
   uint64_t committed = 0;
   const absl::Status status = DragOnce(
@@ -120,8 +121,8 @@ absl::Status CreatePrediction(ModelState& state, const Numbers& numbers) {
   std::string request_id;
   if (numbers[3] % 8 < 3) request_id = absl::StrCat("prediction-", numbers[3] % 8);
   if (numbers[3] % 32 == 7) request_id = std::string(65, 'x');
-  state.Tell("CreatePrediction(", name, ", ", handle, ": pose ", pose, ", model ", model,
-             ", request_id \"", request_id, "\")");
+  state.Log("CreatePrediction(", name, ", ", handle, ": pose ", pose, ", model ", model,
+            ", request_id \"", request_id, "\")");
   v1::CreatePredictionRequest request;
   request.set_session(name);
   *request.add_poses() = ToProto(NamedPose{handle, SomePose(pose)});
@@ -132,30 +133,30 @@ absl::Status CreatePrediction(ModelState& state, const Numbers& numbers) {
       state.model.OfCreatePrediction(name, request_id, fingerprint, model != kNoModel, &joined);
   const bool reaches_session = state.model.FindPredictionOfRequest(request_id) == nullptr &&
                                request_id.size() <= 64 && session != nullptr;
-  const absl::StatusOr<v1::Prediction> told =
+  const absl::StatusOr<v1::Prediction> reported =
       state.client->predictions().Create(name, {{handle, SomePose(pose)}}, model, request_id);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
   if (reaches_session) session->ready = true;
-  if (!told.ok()) return absl::OkStatus();
-  if (!joined.empty()) return CheckSame(state.model.predictions.at(joined).told, *told);
-  return TakePrediction(state, *told,
+  if (!reported.ok()) return absl::OkStatus();
+  if (!joined.empty()) return CheckSame(state.model.predictions.at(joined).reported, *reported);
+  return TakePrediction(state, *reported,
                         {.key = KeyOf(*session, model, pose),
                          .session = name,
                          .request_id = request_id,
                          .fingerprint = fingerprint,
-                         .told = *told});
+                         .reported = *reported});
 }
 
 absl::Status ReadPrediction(ModelState& state, const Numbers& numbers) {
   const std::string name = state.SomePrediction(numbers[0]);
-  state.Tell("GetPrediction and ReadPositions(", name, ")");
+  state.Log("GetPrediction and ReadPositions(", name, ")");
   const Outcome expected = state.model.OfPrediction(name);
-  const absl::StatusOr<v1::Prediction> told = state.client->predictions().Get(name);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
+  const absl::StatusOr<v1::Prediction> reported = state.client->predictions().Get(name);
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
   const absl::StatusOr<Positions> answer = state.client->predictions().ReadPositions(name);
   TF_RETURN_IF_ERROR(CheckOutcome(expected, answer.status()));
   if (!expected.ok()) return absl::OkStatus();
-  TF_RETURN_IF_ERROR(CheckSame(state.model.predictions.at(name).told, *told));
+  TF_RETURN_IF_ERROR(CheckSame(state.model.predictions.at(name).reported, *reported));
   return state.answers.Check(state.model.predictions.at(name).key, *answer);
 }
 
@@ -163,7 +164,7 @@ absl::Status ListPredictions(ModelState& state, const Numbers& numbers) {
   v1::ListPredictionsRequest request;
   request.set_page_size(SomePageSize(numbers[0]));
   if (numbers[1] % 2 == 0) request.set_session(state.SomeSession(numbers[2]));
-  state.Tell("ListPredictions(", request.page_size(), ", ", request.session(), ")");
+  state.Log("ListPredictions(", request.page_size(), ", ", request.session(), ")");
   const auto names = ReadPages<v1::ListPredictionsRequest, v1::ListPredictionsResponse>(
       request,
       [&state](grpc::ClientContext* context, const v1::ListPredictionsRequest& page_request,
@@ -188,7 +189,7 @@ absl::Status ListPredictions(ModelState& state, const Numbers& numbers) {
 
 absl::Status DeletePrediction(ModelState& state, const Numbers& numbers) {
   const std::string name = state.SomePrediction(numbers[0]);
-  state.Tell("DeletePrediction(", name, ")");
+  state.Log("DeletePrediction(", name, ")");
   TF_RETURN_IF_ERROR(
       CheckOutcome(state.model.OfPrediction(name), state.client->predictions().Delete(name)));
   state.model.predictions.erase(name);
@@ -199,19 +200,19 @@ absl::Status ComparePredictions(ModelState& state, const Numbers& numbers) {
   const std::string one = state.SomePrediction(numbers[0]);
   const bool with_model = numbers[1] % 2 == 0;
   const std::string other = with_model ? "" : state.SomePrediction(numbers[2]);
-  state.Tell("ComparePredictions(", one, ", ", with_model ? "linear_elastic" : other, ")");
+  state.Log("ComparePredictions(", one, ", ", with_model ? "linear_elastic" : other, ")");
   const Outcome expected =
       with_model ? state.model.OfCompareModel(one) : state.model.OfCompare(one, other);
   PredictionCalls& calls = state.client->predictions();
-  const absl::StatusOr<ComparedPredictions> told =
+  const absl::StatusOr<ComparedPredictions> reported =
       with_model ? calls.Compare(one, v1::DEFORMATION_MODEL_LINEAR_ELASTIC, true)
                  : calls.Compare(one, other, true);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
   const auto known = state.model.predictions.find(one);
   if (known == state.model.predictions.end()) return absl::OkStatus();
   ServedSession* session = with_model ? state.model.Find(known->second.session) : nullptr;
   if (session != nullptr) session->ready = true;
-  if (!told.ok()) return absl::OkStatus();
+  if (!reported.ok()) return absl::OkStatus();
   AnswerQuestionKey key = known->second.key;
   const Positions& from = *state.answers.Find(key);
   if (with_model) {
@@ -222,9 +223,9 @@ absl::Status ComparePredictions(ModelState& state, const Numbers& numbers) {
   const Positions* to = state.answers.Find(key);
   if (to == nullptr) return absl::OkStatus();  // no call has asked for it
   const double largest = (*to - from).rowwise().norm().maxCoeff();
-  const double told_largest = told->comparison.distances().max_mm();
-  if (told_largest == largest) return absl::OkStatus();
-  return Wrong("the distance is ", largest, " mm, but the server says ", told_largest);
+  const double reported_largest = reported->comparison.distances().max_mm();
+  if (reported_largest == largest) return absl::OkStatus();
+  return Wrong("the distance is ", largest, " mm, but the server says ", reported_largest);
 }
 
 }  // namespace tissueform::testing

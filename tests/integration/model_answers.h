@@ -17,7 +17,7 @@
 namespace tissueform::testing {
 
 // The meshes of a model, by number: the same bar with other positions and another stiffness, so
-// that vertices and regions alone do not tell them apart.
+// that vertices and regions alone do not distinguish them.
 inline constexpr int kModelMeshes = 2;
 const BarProblem& MeshOfModel(int mesh);
 // "meshes/{sha256}"

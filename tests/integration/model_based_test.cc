@@ -99,7 +99,7 @@ class ModelRun {
   }
   // With the one that failed.
   size_t steps_made() const { return steps_made_; }
-  std::string Told() { return absl::StrJoin(state_.told, "\n  "); }
+  std::string Log() { return absl::StrJoin(state_.log, "\n  "); }
 
  private:
   absl::Status Make(const Step& step) {
@@ -114,7 +114,7 @@ class ModelRun {
   }
 
   absl::Status Restart(End end) {
-    state_.told.emplace_back(end == End::kDrain ? "drain and restart" : "kill -9 and restart");
+    state_.log.emplace_back(end == End::kDrain ? "drain and restart" : "kill -9 and restart");
     state_.Disconnect();
     TF_RETURN_IF_ERROR(end == End::kDrain ? server_.Drain() : server_.Kill());
     return StartAs({state_.model});
@@ -125,7 +125,7 @@ class ModelRun {
     ServedModel after = state_.model;
     const Change change = SomeChange(state_, numbers, &after);
     if (change == nullptr) return Restart(End::kKill);
-    state_.told.push_back(absl::StrCat("kill -9 within call ", numbers[0] % 4));
+    state_.log.push_back(absl::StrCat("kill -9 within call ", numbers[0] % 4));
     TF_ASSIGN_OR_RETURN(const auto other_client, server_.Connect());
     absl::Status outcome;
     std::thread caller([&] { outcome = change(); });
@@ -198,7 +198,7 @@ TEST_P(ModelBasedTest, EveryAnswerIsThatOfPlainMaps) {
     const absl::Status shorter = again.Run(
         Shortened({steps.begin(), steps.begin() + static_cast<ptrdiff_t>(run.steps_made())}, 100));
     FAIL() << "seed " << seed << ", " << count << " steps: " << status.message() << "\n  "
-           << run.Told() << "\nshortened: " << shorter.message() << "\n  " << again.Told();
+           << run.Log() << "\nshortened: " << shorter.message() << "\n  " << again.Log();
   }
 }
 

@@ -45,7 +45,7 @@ absl::Status UploadCase(ModelState& state, const Numbers& numbers) {
   const int number = static_cast<int>(numbers[0] % kModelCases);
   const std::string name = NameOfCase(number);
   const std::string title = numbers[1] % 8 == 0 ? "two\nlines" : absl::StrCat("t", numbers[1] % 3);
-  state.Tell("UploadCase(", number, ", ", title, ")");
+  state.Log("UploadCase(", number, ", ", title, ")");
   std::map<std::string, v1::Case>& cases = state.model.cases;
   // The client asks for the case before it sends a header.
   const bool is_there = cases.contains(name);
@@ -54,35 +54,35 @@ absl::Status UploadCase(ModelState& state, const Numbers& numbers) {
     expected = {absl::StatusCode::kResourceExhausted, ErrorReason::kTooManyCases};
   }
   if (!is_there && title == "two\nlines") expected = kInvalidRequest;
-  const auto told = state.client->cases().Upload(BytesOfCase(number), title);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
-  if (!told.ok()) return absl::OkStatus();
-  if (is_there) return CheckSame(cases.at(name), *told);
-  if (told->name() != name || told->title() != title ||
-      told->total_bytes() != static_cast<int64_t>(BytesOfCase(number).size())) {
-    return Wrong(told->DebugString());
+  const auto reported = state.client->cases().Upload(BytesOfCase(number), title);
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
+  if (!reported.ok()) return absl::OkStatus();
+  if (is_there) return CheckSame(cases.at(name), *reported);
+  if (reported->name() != name || reported->title() != title ||
+      reported->total_bytes() != static_cast<int64_t>(BytesOfCase(number).size())) {
+    return Wrong(reported->DebugString());
   }
-  cases[name] = *told;
+  cases[name] = *reported;
   return absl::OkStatus();
 }
 
 absl::Status ReadCase(ModelState& state, const Numbers& numbers) {
   const std::string name = SomeCase(numbers[0]);
-  state.Tell("GetCase and ReadCase(", name, ")");
+  state.Log("GetCase and ReadCase(", name, ")");
   const Outcome expected = OfCase(state, name);
-  const absl::StatusOr<v1::Case> told = state.client->cases().Get(name);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
+  const absl::StatusOr<v1::Case> reported = state.client->cases().Get(name);
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
   const absl::StatusOr<std::string> bytes = state.client->cases().Read(name);
   TF_RETURN_IF_ERROR(CheckOutcome(expected, bytes.status()));
   if (!expected.ok()) return absl::OkStatus();
   // Its digest is its name, which Read compares.
-  return CheckSame(state.model.cases.at(name), *told);
+  return CheckSame(state.model.cases.at(name), *reported);
 }
 
 absl::Status ListCases(ModelState& state, const Numbers& numbers) {
   v1::ListCasesRequest request;
   request.set_page_size(SomePageSize(numbers[0]));
-  state.Tell("ListCases(", request.page_size(), ")");
+  state.Log("ListCases(", request.page_size(), ")");
   const auto names = ReadPages<v1::ListCasesRequest, v1::ListCasesResponse>(
       request,
       [&state](grpc::ClientContext* context, const v1::ListCasesRequest& page_request,
@@ -95,13 +95,13 @@ absl::Status ListCases(ModelState& state, const Numbers& numbers) {
         return of_page;
       });
   std::vector<std::string> expected;
-  for (const auto& [name, told] : state.model.cases) expected.push_back(name);
+  for (const auto& [name, reported] : state.model.cases) expected.push_back(name);
   return CheckPages(request.page_size(), names, expected);
 }
 
 absl::Status DeleteCase(ModelState& state, const Numbers& numbers) {
   const std::string name = SomeCase(numbers[0]);
-  state.Tell("DeleteCase(", name, ")");
+  state.Log("DeleteCase(", name, ")");
   TF_RETURN_IF_ERROR(CheckOutcome(OfCase(state, name), state.client->cases().Delete(name)));
   state.model.cases.erase(name);
   return absl::OkStatus();
@@ -111,13 +111,13 @@ absl::Status CheckCases(const std::vector<v1::Case>& listed, ServedModel* model)
   if (listed.size() != model->cases.size()) {
     return Wrong("there must be ", model->cases.size(), " cases, but there are ", listed.size());
   }
-  for (const v1::Case& told : listed) {
-    const auto known = model->cases.find(told.name());
-    if (known == model->cases.end()) return Wrong(told.name(), " must not be there");
+  for (const v1::Case& reported : listed) {
+    const auto known = model->cases.find(reported.name());
+    if (known == model->cases.end()) return Wrong(reported.name(), " must not be there");
     if (!known->second.has_create_time()) {
-      *known->second.mutable_create_time() = told.create_time();
+      *known->second.mutable_create_time() = reported.create_time();
     }
-    TF_RETURN_IF_ERROR(CheckSame(known->second, told));
+    TF_RETURN_IF_ERROR(CheckSame(known->second, reported));
   }
   return absl::OkStatus();
 }

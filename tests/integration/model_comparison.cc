@@ -49,17 +49,17 @@ absl::Status Matches(const std::set<std::string>& etags, const Listed& listed, S
   for (const v1::Mesh& mesh : listed.meshes) {
     if (!model->meshes.contains(mesh.name())) return Wrong(mesh.name(), " must not be there");
   }
-  for (const v1::Session& told : listed.sessions) {
-    ServedSession* session = model->Find(told.name());
-    if (session == nullptr) return Wrong(told.name(), " must not be there");
-    if (session->etag.empty() && !etags.contains(told.etag())) session->etag = told.etag();
-    if (session->create_time == 0) session->create_time = told.create_time().seconds();
-    TF_RETURN_IF_ERROR(CheckSession(told.name(), *session, told));
+  for (const v1::Session& reported : listed.sessions) {
+    ServedSession* session = model->Find(reported.name());
+    if (session == nullptr) return Wrong(reported.name(), " must not be there");
+    if (session->etag.empty() && !etags.contains(reported.etag())) session->etag = reported.etag();
+    if (session->create_time == 0) session->create_time = reported.create_time().seconds();
+    TF_RETURN_IF_ERROR(CheckSession(reported.name(), *session, reported));
   }
-  for (const v1::Prediction& told : listed.predictions) {
-    const auto known = model->predictions.find(told.name());
-    if (known == model->predictions.end()) return Wrong(told.name(), " must not be there");
-    TF_RETURN_IF_ERROR(CheckSame(known->second.told, told));
+  for (const v1::Prediction& reported : listed.predictions) {
+    const auto known = model->predictions.find(reported.name());
+    if (known == model->predictions.end()) return Wrong(reported.name(), " must not be there");
+    TF_RETURN_IF_ERROR(CheckSame(known->second.reported, reported));
   }
   return CheckCases(listed.cases, model);
 }
@@ -68,12 +68,12 @@ absl::Status Matches(const std::set<std::string>& etags, const Listed& listed, S
 
 absl::Status SolveAll(ModelState& state) {
   for (auto& [name, session] : state.model.sessions) {
-    state.Tell("DeformOnce(", name, ") at the end");
+    state.Log("DeformOnce(", name, ") at the end");
     const int pose = session.pose.value_or(0);
-    TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse told,
+    TF_ASSIGN_OR_RETURN(const v1::DeformOnceResponse reported,
                         state.client->DeformOnce(name, {{session.handle(), SomePose(pose)}}));
     TF_ASSIGN_OR_RETURN(const Positions answer,
-                        DecodePositions(told.positions(), MeshOfModel(0).mesh.num_vertices()));
+                        DecodePositions(reported.positions(), MeshOfModel(0).mesh.num_vertices()));
     TF_RETURN_IF_ERROR(state.answers.Check(KeyOf(session, kOwnModel, pose), answer));
     session.ready = true;
   }
@@ -81,7 +81,7 @@ absl::Status SolveAll(ModelState& state) {
 }
 
 absl::Status CompareAll(ModelState& state, const std::vector<ServedModel>& possible) {
-  state.Tell("all is compared");
+  state.Log("all is compared");
   TF_ASSIGN_OR_RETURN(const Listed listed, ListAll(state));
   absl::Status wrong;
   for (ServedModel model : possible) {
@@ -96,7 +96,7 @@ absl::Status CompareAll(ModelState& state, const std::vector<ServedModel>& possi
     TF_ASSIGN_OR_RETURN(const Positions answer, state.client->predictions().ReadPositions(name));
     TF_RETURN_IF_ERROR(state.answers.Check(prediction.key, answer));
   }
-  for (const auto& [name, told] : state.model.cases) {
+  for (const auto& [name, reported] : state.model.cases) {
     TF_RETURN_IF_ERROR(state.client->cases().Read(name).status());  // compares the digest
   }
   return absl::OkStatus();

@@ -26,28 +26,28 @@ std::vector<std::string> NamesOf(const Map& map) {
   return names;
 }
 
-absl::Status TakeSession(ModelState& state, const v1::Session& told,
+absl::Status TakeSession(ModelState& state, const v1::Session& reported,
                          const SessionRequest& request) {
   const std::string name =
-      request.session_id.empty() ? told.name() : SessionName(request.session_id);
+      request.session_id.empty() ? reported.name() : SessionName(request.session_id);
   ServedSession session;
   session.mesh = request.mesh == NameOfMesh(1) ? 1 : 0;
   session.recipe = request;
   session.request_id = request.request_id;
   session.fingerprint = RequestFingerprint(ToProto(request));
-  session.etag = told.etag();
-  session.create_time = told.create_time().seconds();
+  session.etag = reported.etag();
+  session.create_time = reported.create_time().seconds();
   session.ready = true;
   if (!state.etags.insert(session.etag).second) return Wrong("etag ", session.etag, " comes again");
   if (!state.model.sessions.emplace(name, session).second) return Wrong(name, " comes again");
-  return CheckSession(name, session, told);
+  return CheckSession(name, session, reported);
 }
 
 }  // namespace
 
 absl::Status UploadMesh(ModelState& state, const Numbers& numbers) {
   const int mesh = static_cast<int>(numbers[0] % kModelMeshes);
-  state.Tell("UploadMesh(", mesh, ")");
+  state.Log("UploadMesh(", mesh, ")");
   const BarProblem& problem = MeshOfModel(mesh);
   const std::vector<CellArray> arrays = problem.CellArrays();
   const MeshPayloadView payload =
@@ -74,13 +74,13 @@ absl::Status UploadMesh(ModelState& state, const Numbers& numbers) {
 absl::Status GetMesh(ModelState& state, const Numbers& numbers) {
   v1::GetMeshRequest request;
   request.set_name(SomeMesh(numbers[0]));
-  state.Tell("GetMesh(", request.name(), ")");
+  state.Log("GetMesh(", request.name(), ")");
   grpc::ClientContext context;
-  v1::Mesh told;
-  const grpc::Status status = state.meshes->GetMesh(&context, request, &told);
+  v1::Mesh reported;
+  const grpc::Status status = state.meshes->GetMesh(&context, request, &reported);
   TF_RETURN_IF_ERROR(CheckOutcome(state.model.OfMesh(request.name()), FromGrpcStatus(status)));
-  if (status.ok() && told.vertex_count() != MeshOfModel(0).mesh.num_vertices()) {
-    return Wrong(told.DebugString());
+  if (status.ok() && reported.vertex_count() != MeshOfModel(0).mesh.num_vertices()) {
+    return Wrong(reported.DebugString());
   }
   return absl::OkStatus();
 }
@@ -88,7 +88,7 @@ absl::Status GetMesh(ModelState& state, const Numbers& numbers) {
 absl::Status ListMeshes(ModelState& state, const Numbers& numbers) {
   v1::ListMeshesRequest request;
   request.set_page_size(SomePageSize(numbers[0]));
-  state.Tell("ListMeshes(", request.page_size(), ")");
+  state.Log("ListMeshes(", request.page_size(), ")");
   const auto names = ReadPages<v1::ListMeshesRequest, v1::ListMeshesResponse>(
       request,
       [&state](grpc::ClientContext* context, const v1::ListMeshesRequest& page_request,
@@ -106,7 +106,7 @@ absl::Status ListMeshes(ModelState& state, const Numbers& numbers) {
 
 absl::Status DeleteMesh(ModelState& state, const Numbers& numbers) {
   const std::string mesh = SomeMesh(numbers[0]);
-  state.Tell("DeleteMesh(", mesh, ")");
+  state.Log("DeleteMesh(", mesh, ")");
   const Outcome expected = state.model.OfDeleteMesh(mesh);
   TF_RETURN_IF_ERROR(CheckOutcome(expected, state.client->DeleteMesh(mesh)));
   if (expected.ok()) state.model.meshes.erase(mesh);
@@ -122,31 +122,32 @@ absl::Status CreateSession(ModelState& state, const Numbers& numbers) {
   if (numbers[2] % 32 == 7) request.session_id = "too-short";
   if (numbers[3] % 8 < 3) request.request_id = absl::StrCat("request-", numbers[3] % 8);
   if (numbers[3] % 32 == 7) request.request_id = std::string(65, 'x');
-  state.Tell("CreateSession(", mesh, ", recipe ", recipe, ", session_id \"", request.session_id,
-             "\", request_id \"", request.request_id, "\")");
+  state.Log("CreateSession(", mesh, ", recipe ", recipe, ", session_id \"", request.session_id,
+            "\", request_id \"", request.request_id, "\")");
   std::string joined;
   const Outcome expected = state.model.OfCreateSession(request, recipe, kMaxSessions, &joined);
-  const absl::StatusOr<v1::Session> told = state.client->CreateSession(request);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
-  if (!told.ok()) return absl::OkStatus();
-  if (joined.empty()) return TakeSession(state, *told, request);
+  const absl::StatusOr<v1::Session> reported = state.client->CreateSession(request);
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
+  if (!reported.ok()) return absl::OkStatus();
+  if (joined.empty()) return TakeSession(state, *reported, request);
   ServedSession& session = state.model.sessions.at(joined);
   session.ready = true;
-  return CheckSession(joined, session, *told);
+  return CheckSession(joined, session, *reported);
 }
 
 absl::Status GetSession(ModelState& state, const Numbers& numbers) {
   const std::string name = state.SomeSession(numbers[0]);
-  state.Tell("GetSession(", name, ")");
-  const absl::StatusOr<v1::Session> told = state.client->GetSession(name);
-  TF_RETURN_IF_ERROR(CheckOutcome(state.model.OfSession(name), told.status()));
-  return told.ok() ? CheckSession(name, state.model.sessions.at(name), *told) : absl::OkStatus();
+  state.Log("GetSession(", name, ")");
+  const absl::StatusOr<v1::Session> reported = state.client->GetSession(name);
+  TF_RETURN_IF_ERROR(CheckOutcome(state.model.OfSession(name), reported.status()));
+  return reported.ok() ? CheckSession(name, state.model.sessions.at(name), *reported)
+                       : absl::OkStatus();
 }
 
 absl::Status ListSessions(ModelState& state, const Numbers& numbers) {
   v1::ListSessionsRequest request;
   request.set_page_size(SomePageSize(numbers[0]));
-  state.Tell("ListSessions(", request.page_size(), ")");
+  state.Log("ListSessions(", request.page_size(), ")");
   const auto names = ReadPages<v1::ListSessionsRequest, v1::ListSessionsResponse>(
       request,
       [&state](grpc::ClientContext* context, const v1::ListSessionsRequest& page_request,
@@ -170,21 +171,22 @@ absl::Status UpdateSession(ModelState& state, const Numbers& numbers) {
   if (numbers[1] % 4 == 3 && !state.etags.empty()) {
     update.request.set_etag(*std::next(state.etags.begin(), numbers[1] / 4 % state.etags.size()));
   }
-  state.Tell("UpdateSession(", name, ", etag \"", update.request.etag(), "\", ", update.words, ")");
+  state.Log("UpdateSession(", name, ", etag \"", update.request.etag(), "\", ", update.words, ")");
   const Outcome expected =
       state.model.OfUpdateSession(update.request, update.changes, update.legal);
-  const absl::StatusOr<v1::Session> told = state.client->UpdateSession(update.request);
-  TF_RETURN_IF_ERROR(CheckOutcome(expected, told.status()));
-  if (!told.ok()) return absl::OkStatus();
+  const absl::StatusOr<v1::Session> reported = state.client->UpdateSession(update.request);
+  TF_RETURN_IF_ERROR(CheckOutcome(expected, reported.status()));
+  if (!reported.ok()) return absl::OkStatus();
   Apply(update.request, session);
-  session->etag = told->etag();
-  if (!state.etags.insert(told->etag()).second) return Wrong("etag ", told->etag(), " comes again");
-  return CheckSession(name, *session, *told);
+  session->etag = reported->etag();
+  if (!state.etags.insert(reported->etag()).second)
+    return Wrong("etag ", reported->etag(), " comes again");
+  return CheckSession(name, *session, *reported);
 }
 
 absl::Status DeleteSession(ModelState& state, const Numbers& numbers) {
   const std::string name = state.SomeSession(numbers[0]);
-  state.Tell("DeleteSession(", name, ")");
+  state.Log("DeleteSession(", name, ")");
   TF_RETURN_IF_ERROR(CheckOutcome(state.model.OfSession(name), state.client->DeleteSession(name)));
   state.model.sessions.erase(name);
   return absl::OkStatus();

@@ -60,9 +60,9 @@ absl::Status CheckSame(const google::protobuf::Message& expected,
 
 // What the server measures is not predicted.
 absl::Status CheckSession(const std::string& name, const ServedSession& expected,
-                          v1::Session told) {
-  ClearMeasured(&told);
-  return CheckSame(ExpectedSession(name, expected), told);
+                          v1::Session reported) {
+  ClearMeasured(&reported);
+  return CheckSame(ExpectedSession(name, expected), reported);
 }
 
 AnswerQuestionKey KeyOf(const ServedSession& session, v1::DeformationModel model, int pose) {

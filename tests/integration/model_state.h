@@ -41,8 +41,8 @@ struct ModelState {
   std::string SomePrediction(uint32_t number) const;
 
   template <typename... Words>
-  void Tell(const Words&... words) {
-    told.push_back(absl::StrCat(words...));
+  void Log(const Words&... words) {
+    log.push_back(absl::StrCat(words...));
   }
 
   std::unique_ptr<TissueformClient> client;
@@ -52,8 +52,8 @@ struct ModelState {
   std::unique_ptr<v1::CaseService::Stub> cases;
   ServedModel model;
   ModelAnswers answers;
-  std::set<std::string> etags;    // all that were
-  std::vector<std::string> told;  // what was called, in words; the last one is that which failed
+  std::set<std::string> etags;   // all that were
+  std::vector<std::string> log;  // what was called, in words; the last one is that which failed
 };
 
 // The server has answered something else than the model.
@@ -64,7 +64,8 @@ absl::Status Wrong(const Words&... words) {
 
 absl::Status CheckSame(const google::protobuf::Message& expected,
                        const google::protobuf::Message& got);
-absl::Status CheckSession(const std::string& name, const ServedSession& expected, v1::Session told);
+absl::Status CheckSession(const std::string& name, const ServedSession& expected,
+                          v1::Session reported);
 // What is asked for; the session's own model when unspecified.
 AnswerQuestionKey KeyOf(const ServedSession& session, v1::DeformationModel model, int pose);
 

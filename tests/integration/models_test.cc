@@ -103,7 +103,7 @@ TEST_F(ModelsTest, OneSessionAnswersWithEveryModel) {
   EXPECT_EQ(after.model(), v1::DEFORMATION_MODEL_GRADIENT_FIELD) << "its own model stays";
 }
 
-TEST_F(ModelsTest, ASessionsOwnModelIsToldBack) {
+TEST_F(ModelsTest, ASessionReturnsItsOwnModel) {
   request_.model = DeformationModel::kNeoHookean;
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client_->CreateSession(request_));
   EXPECT_EQ(session.model(), v1::DEFORMATION_MODEL_NEO_HOOKEAN);
@@ -222,7 +222,7 @@ TEST_F(ModelsTest, PreparedAnswersOfTheSkinHoldItsVerticesOnly) {
   }
 }
 
-TEST_F(ModelsTest, WhatCannotBePreparedIsRefusedAndTheSessionGoesOn) {
+TEST_F(ModelsTest, RefusesInvalidPreparationsAndTheSessionGoesOn) {
   const auto refusal = [this](v1::DeformationModel model, const v1::PreparedAnswers& prepared) {
     DeformStream::Options options;
     options.model = model;

@@ -106,7 +106,7 @@ class PlanBuildsOfServerTest : public ServiceTest {
     return build;
   }
 
-  // All states that a watch tells, the last of which is the end.
+  // All states that a watch sends, the last of which is the end.
   std::vector<v1::PlanBuild> Watch(const std::string& name) {
     const auto context = ContextOf(ann_);
     context->set_deadline(std::chrono::system_clock::now() + kMostOfABuild);
@@ -328,7 +328,7 @@ TEST_F(PlanBuildsOfServerTest, AFailureIsOneSentenceWithoutAPathOfTheServer) {
   EXPECT_THAT(no_volume.detail(), Not(HasSubstr("/")));
 }
 
-TEST_F(PlanBuildsOfServerTest, WhatIsNoRequestIsRefused) {
+TEST_F(PlanBuildsOfServerTest, RefusesInvalidRequests) {
   Start();
   v1::BuildFile file;
   EXPECT_EQ(Send(reader_, ct_, ".nrrd", 0, &file).error_code(), Code::PERMISSION_DENIED);
@@ -390,7 +390,7 @@ TEST_F(PlanBuildsOfServerTest, ADraftBelongsToItsOwnerAndThoseOfItsProject) {
   EXPECT_THAT(ListDrafts(bridge_), ::testing::ElementsAre(alone.name()));
 }
 
-TEST_F(PlanBuildsOfServerTest, APlannersBuildOfADraftTellsItsCaseToTheBridge) {
+TEST_F(PlanBuildsOfServerTest, APlannersBuildOfADraftReportsItsCaseToTheBridge) {
   Start();
   Share(bridge_, ann_.name, v1::SHARE_ROLE_PLANNER);
   v1::BuildDraft draft = CreateDraft(bridge_, "p");
@@ -405,7 +405,7 @@ TEST_F(PlanBuildsOfServerTest, APlannersBuildOfADraftTellsItsCaseToTheBridge) {
   EXPECT_THAT(draft.cases(), ::testing::ElementsAre(done.case_()));
 }
 
-TEST_F(PlanBuildsOfServerTest, WhatIsNoDraftIsRefused) {
+TEST_F(PlanBuildsOfServerTest, RefusesInvalidDrafts) {
   Start();
   v1::BuildFile file;
   ASSERT_TRUE(Send(ann_, ct_, ".nrrd", 0, &file).ok());

@@ -137,17 +137,18 @@ TEST_F(PlanServiceTest, TheModelItselfHasTheLastWordWhereThatIsAsked) {
   ASSERT_OK_AND_ASSIGN(const Positions positions,
                        DecodePositions(answer.positions(), problem_.mesh.num_vertices()));
   for (int k = 0; k < fit.targets_size(); ++k) {
-    const v1::Vector3& told = fit.targets(k).position_mm();
+    const v1::Vector3& reported = fit.targets(k).position_mm();
     // The point is a vertex: it is where the session says that vertex is.
-    const auto nearest = (positions.rowwise() - Eigen::RowVector3d(told.x(), told.y(), told.z()))
-                             .rowwise()
-                             .norm()
-                             .minCoeff();
+    const auto nearest =
+        (positions.rowwise() - Eigen::RowVector3d(reported.x(), reported.y(), reported.z()))
+            .rowwise()
+            .norm()
+            .minCoeff();
     EXPECT_LT(nearest, 1e-3) << fit.targets(k).name();
   }
 }
 
-TEST_F(PlanServiceTest, WhatIsWantedElseOfTheSamePointsTakesNoMoreMemory) {
+TEST_F(PlanServiceTest, OtherTargetsOfTheSamePointsTakeNoMoreMemory) {
   const auto bytes_held = [&] { return client_->GetSession(session_.name())->bytes_held(); };
   ASSERT_THAT(Fit(Wanted(SomePose(1))), IsOk());
   const int64_t once = bytes_held();
@@ -157,7 +158,7 @@ TEST_F(PlanServiceTest, WhatIsWantedElseOfTheSamePointsTakesNoMoreMemory) {
   EXPECT_GT(bytes_held(), once);  // other points
 }
 
-TEST_F(PlanServiceTest, WhatCannotBeReachedIsTold) {
+TEST_F(PlanServiceTest, ReportsTargetsThatCannotBeReached) {
   v1::FitRequest request = Wanted(SomePose(1), 2);
   for (v1::FitTarget& target : *request.mutable_targets()) {
     *target.mutable_displacement_mm() = Vector({0, 0, 100});

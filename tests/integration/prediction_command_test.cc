@@ -63,13 +63,13 @@ TEST_F(PredictionCommandTest, TitleAndCaseAreKeptAndListed) {
   const std::string plain = Create({});
   const std::string listed = Prediction({"list", "--case", "cases/" + digest}).out;
   EXPECT_THAT(listed, AllOf(HasSubstr(titled), HasSubstr("Chin 8 mm"), Not(HasSubstr(plain))));
-  const Json told = Json::parse(Prediction({"show", titled, "--json"}).out);
-  EXPECT_EQ(told["title"], "Chin 8 mm");
-  EXPECT_EQ(told["case"], "cases/" + digest);
+  const Json parsed = Json::parse(Prediction({"show", titled, "--json"}).out);
+  EXPECT_EQ(parsed["title"], "Chin 8 mm");
+  EXPECT_EQ(parsed["case"], "cases/" + digest);
   EXPECT_THAT(Prediction({"list", "--case", "none"}), FailsWith(1, HasSubstr("invalid case name")));
 }
 
-TEST_F(PredictionCommandTest, WhatIsSentIsListedAndTakenBack) {
+TEST_F(PredictionCommandTest, ListsAndWithdrawsASentPrediction) {
   const std::string of_case = Create({"--case", std::string(64, 'c')});
   const ProcessResult sent = Prediction({"send", of_case});
   EXPECT_THAT(sent, Succeeds());
@@ -89,10 +89,10 @@ TEST_F(PredictionCommandTest, ListsShowsComparesAndDeletes) {
   EXPECT_THAT(Prediction({"list"}).out,
               AllOf(HasSubstr(field), HasSubstr(elastic), ContainsRegex("\n2 predictions\n")));
   const ProcessResult shown = Prediction({"show", field, "--json"});
-  const Json told = Json::parse(shown.out);
-  EXPECT_EQ(told["prediction"], field);
-  EXPECT_EQ(told["model"], "gradient_field");
-  EXPECT_THAT(told["notice"], HasSubstr("not a medical device"));
+  const Json parsed = Json::parse(shown.out);
+  EXPECT_EQ(parsed["prediction"], field);
+  EXPECT_EQ(parsed["model"], "gradient_field");
+  EXPECT_THAT(parsed["notice"], HasSubstr("not a medical device"));
   const std::string id = field.substr(field.find('/') + 1);
   EXPECT_THAT(Prediction({"show", id}).out, HasSubstr(field));
 

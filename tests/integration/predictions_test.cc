@@ -127,13 +127,13 @@ TEST_F(PredictionsTest, ComparesTwoByTheDistancesOfTheirVertices) {
   ASSERT_OK_AND_ASSIGN(const Positions to, calls().ReadPositions(other.name()));
   EXPECT_LT((compared.differences - (to - from)).cwiseAbs().maxCoeff(), 1e-6);
   const Eigen::VectorXd distances = (to - from).rowwise().norm();
-  const v1::DistanceStatistics& told = compared.comparison.distances();
-  EXPECT_EQ(told.vertex_count(), problem_.mesh.num_vertices());
-  EXPECT_NEAR(told.mean_mm(), distances.mean(), 1e-12);
-  EXPECT_EQ(told.max_mm(), distances.maxCoeff());
-  EXPECT_EQ(distances[told.worst_vertex()], told.max_mm());
-  EXPECT_LE(told.p50_mm(), told.p95_mm());
-  EXPECT_LE(told.p95_mm(), told.max_mm());
+  const v1::DistanceStatistics& reported = compared.comparison.distances();
+  EXPECT_EQ(reported.vertex_count(), problem_.mesh.num_vertices());
+  EXPECT_NEAR(reported.mean_mm(), distances.mean(), 1e-12);
+  EXPECT_EQ(reported.max_mm(), distances.maxCoeff());
+  EXPECT_EQ(distances[reported.worst_vertex()], reported.max_mm());
+  EXPECT_LE(reported.p50_mm(), reported.p95_mm());
+  EXPECT_LE(reported.p95_mm(), reported.max_mm());
   EXPECT_EQ(compared.comparison.other_prediction(), other.name());
   EXPECT_EQ(compared.comparison.other_quality().DebugString(), other.quality().DebugString());
   EXPECT_EQ(one.recipe_sha256(), other.recipe_sha256());
@@ -181,12 +181,13 @@ TEST_F(PredictionsTest, ComparesTheSkinOrListedVerticesOnly) {
     ASSERT_EQ(compared.differences.rows(), expected.rows());
     EXPECT_LT((compared.differences - expected).cwiseAbs().maxCoeff(), 1e-6);
     const Eigen::VectorXd distances = expected.rowwise().norm();
-    const v1::DistanceStatistics& told = compared.comparison.distances();
-    EXPECT_EQ(told.vertex_count(), vertices.size());
-    EXPECT_NEAR(told.mean_mm(), distances.mean(), 1e-12);
-    EXPECT_EQ(told.max_mm(), distances.maxCoeff());
-    EXPECT_EQ(moved.row(told.worst_vertex()).norm(), told.max_mm()) << "numbered as in the mesh";
-    EXPECT_THAT(vertices, ::testing::Contains(told.worst_vertex()));
+    const v1::DistanceStatistics& reported = compared.comparison.distances();
+    EXPECT_EQ(reported.vertex_count(), vertices.size());
+    EXPECT_NEAR(reported.mean_mm(), distances.mean(), 1e-12);
+    EXPECT_EQ(reported.max_mm(), distances.maxCoeff());
+    EXPECT_EQ(moved.row(reported.worst_vertex()).norm(), reported.max_mm())
+        << "numbered as in the mesh";
+    EXPECT_THAT(vertices, ::testing::Contains(reported.worst_vertex()));
     ASSERT_OK_AND_ASSIGN(const ComparedPredictions by_model,
                          calls().Compare(one.name(), one.model(), true, asked));
     EXPECT_EQ(by_model.comparison.distances().vertex_count(), vertices.size());
@@ -213,7 +214,7 @@ TEST_F(PredictionsTest, VerticesThatCannotBeComparedAreRefused) {
 }
 
 // What is named must be of one mesh and its session still that of before.
-TEST_F(PredictionsTest, WhatCannotBeComparedIsRefused) {
+TEST_F(PredictionsTest, RefusesToCompareDifferentMeshesAndChangedSessions) {
   ASSERT_OK_AND_ASSIGN(const v1::Prediction one, Predict(1));
   const BarProblem other(8);
   const v1::Session of_other = MakeSession(client_.get(), other);

@@ -38,13 +38,13 @@ class PrepareSessionServiceTest : public ServiceTest {
   PreparationWait Listening() {
     PreparationWait wait;
     wait.on_progress = [this](const v1::PreparationProgress& progress) {
-      told_.push_back(progress);
+      reported_.push_back(progress);
     };
     return wait;
   }
 
   const BarProblem problem_{5};
-  std::vector<v1::PreparationProgress> told_;
+  std::vector<v1::PreparationProgress> reported_;
 };
 
 TEST_F(PrepareSessionServiceTest, GivesASessionThatAnswersAsACreatedOneDoes) {
@@ -55,10 +55,11 @@ TEST_F(PrepareSessionServiceTest, GivesASessionThatAnswersAsACreatedOneDoes) {
   stream.prepared.emplace();
   *request.mutable_stream() = DeformStream::ConfigurationOf(stream);
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client->PrepareSession(request, Listening()));
-  ASSERT_THAT(told_, Not(IsEmpty()));
+  ASSERT_THAT(reported_, Not(IsEmpty()));
   // A slow network may deliver only the newest progress, but stages never go back.
-  for (size_t i = 1; i < told_.size(); ++i) EXPECT_GE(told_[i].stage(), told_[i - 1].stage());
-  EXPECT_THAT(ProgressText(told_.front()), Not(IsEmpty()));
+  for (size_t i = 1; i < reported_.size(); ++i)
+    EXPECT_GE(reported_[i].stage(), reported_[i - 1].stage());
+  EXPECT_THAT(ProgressText(reported_.front()), Not(IsEmpty()));
   ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
                        client->DeformOnce(session.name(), TopPose(SomePose(2))));
   const v1::Session created = MakeSession(client.get(), problem_);
@@ -80,11 +81,11 @@ TEST_F(PrepareSessionServiceTest, UpdatesAndOpensAndHasTheErrorsOfTheUnaryCalls)
   EXPECT_EQ(updated.model(), v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
   const absl::Status stale = client->PrepareSession(request, {}).status();
   EXPECT_TRUE(HasReason(stale, ErrorReason::kStaleEtag)) << stale;
-  told_.clear();
+  reported_.clear();
   request.set_open(session.name());
   ASSERT_OK_AND_ASSIGN(const v1::Session opened, client->PrepareSession(request, Listening()));
   EXPECT_EQ(opened.etag(), updated.etag());
-  EXPECT_THAT(told_, IsEmpty()) << "it is there";
+  EXPECT_THAT(reported_, IsEmpty()) << "it is there";
   request.set_open("sessions/none");
   const absl::Status missing = client->PrepareSession(request, {}).status();
   EXPECT_TRUE(HasReason(missing, ErrorReason::kSessionNotFound)) << missing;
@@ -99,7 +100,7 @@ TEST_F(PrepareSessionServiceTest, ACancelledWaitEndsAndLeavesNothing) {
   request.mutable_create()->set_request_id("again");
   request.mutable_create()->set_model(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
   PreparationWait wait = Listening();
-  wait.cancellation = Cancellation([this] { return !told_.empty(); });
+  wait.cancellation = Cancellation([this] { return !reported_.empty(); });
   EXPECT_THAT(client->PrepareSession(request, wait),
               StatusIs(absl::StatusCode::kCancelled, HasSubstr("")));
   EXPECT_TRUE(Eventually([&] {
@@ -111,7 +112,7 @@ TEST_F(PrepareSessionServiceTest, ACancelledWaitEndsAndLeavesNothing) {
   EXPECT_THAT(client->DeleteSession(session.name()), IsOk());
 }
 
-TEST_F(PrepareSessionServiceTest, WhoWaitsForTheSamePreparationHearsOfIt) {
+TEST_F(PrepareSessionServiceTest, ConcurrentRequestsShareOnePreparation) {
   const auto first = Connect();
   const auto second = Connect();
   v1::PrepareSessionRequest request = Creation(first.get(), problem_);

@@ -36,14 +36,14 @@ failures = []
 
 
 def expect(holds, what, why=""):
-    """A line each; the exit code tells whether all were right."""
+    """A line each; the exit code shows whether all were right."""
     print("right:" if holds else "WRONG:", what, "" if holds else why)
     if not holds:
         failures.append(what)
 
 
 class Program:
-    """One of ours, which tells its port of metrics in its log, and a line on stdout when it is ready."""
+    """One of ours, which reports its port of metrics in its log, and a line on stdout when it is ready."""
 
     def __init__(self, *arguments):
         self.process = subprocess.Popen([*arguments, "--metrics-port", "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -125,7 +125,7 @@ def scrape(folder, source, ports):
         expect(jobs == ["tissueform", "tissueform-gateway"], "prometheus scrapes both programs", jobs)
         expect(len(ask(port, "rules")["groups"][0]["rules"]) > 15, "prometheus has the rules")
         found = []
-        # A target is up a moment before what it has told is kept.
+        # A target is up a moment before what it has reported is kept.
         while not found and process.poll() is None and time.monotonic() < end:
             found = ask(port, "query?query=tissueform_build_info")["result"]
             time.sleep(0.1)

@@ -64,11 +64,11 @@ TEST_F(RestartTest, ADragGoesOnThroughKillAndRestart) {
   const std::unique_ptr<TissueformClient> client = Connect();
   const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");
   ReattachingStream::Options options;
-  std::vector<std::string> told;
-  options.reattachment.on_detached = [&told](const absl::Status& /*why*/) {
-    told.emplace_back("detached");
+  std::vector<std::string> events;
+  options.reattachment.on_detached = [&events](const absl::Status& /*why*/) {
+    events.emplace_back("detached");
   };
-  options.reattachment.on_reattached = [&told] { told.emplace_back("reattached"); };
+  options.reattachment.on_reattached = [&events] { events.emplace_back("reattached"); };
   ASSERT_OK_AND_ASSIGN(const std::unique_ptr<ReattachingStream> drag,
                        ReattachingStream::Open(client.get(), session.name(), options));
   drag->SendPoses(1, TopPose(SomePose(1)), /*commit=*/true);
@@ -96,7 +96,7 @@ TEST_F(RestartTest, ADragGoesOnThroughKillAndRestart) {
   ASSERT_TRUE(frame.has_value());
   EXPECT_EQ(frame->positions(), before) << "the same pose, to the last bit";
   EXPECT_EQ(drag->reattachments(), 1);
-  EXPECT_EQ(told, (std::vector<std::string>{"detached", "reattached"}));
+  EXPECT_EQ(events, (std::vector<std::string>{"detached", "reattached"}));
   drag->CloseSending();
   while (drag->Receive().has_value()) {
   }
@@ -156,7 +156,7 @@ TEST_F(RestartTest, AnUploadGoesOnThroughKillAndRestart) {
       << "nothing is left of the way";
 }
 
-TEST_F(RestartTest, WhatCameOfAnUploadThatItsClientBrokeOffIsThere) {
+TEST_F(RestartTest, APartialUploadSurvivesARestart) {
   ASSERT_NO_FATAL_FAILURE(Start());
   const MeshPayloadView payload = ViewMeshPayload(bar_.mesh.positions(), bar_.mesh.tets(), {});
   {
@@ -186,7 +186,7 @@ TEST_F(RestartTest, WhatCameOfAnUploadThatItsClientBrokeOffIsThere) {
   EXPECT_EQ(resumed, 1000);
 }
 
-TEST_F(RestartTest, AFailedCommitIsToldWithoutTheServersPaths) {
+TEST_F(RestartTest, AFailedCommitIsReportedWithoutTheServersPaths) {
   ASSERT_NO_FATAL_FAILURE(Start());
   const std::unique_ptr<TissueformClient> client = Connect();
   const v1::Session session = MakeSession(client.get(), "a-session-of-this-test");

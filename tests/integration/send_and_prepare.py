@@ -107,9 +107,9 @@ def main():
             "/tissueform.v1.SessionService/PrepareSession",
             request_serializer=lambda message: message.SerializeToString(),
             response_deserializer=messages("PrepareSessionResponse").FromString)
-        *told, last = prepare(request, timeout=PATIENCE_S)
-        places = [(answer.progress.stage, answer.progress.step) for answer in told]
-        print("progress:", len(places) > 0 and all(answer.HasField("progress") for answer in told),
+        *progress, last = prepare(request, timeout=PATIENCE_S)
+        places = [(answer.progress.stage, answer.progress.step) for answer in progress]
+        print("progress:", len(places) > 0 and all(answer.HasField("progress") for answer in progress),
               "in order:", places == sorted(set(places)))
         print("session:", last.session.name.startswith("sessions/"), last.session.mesh == mesh.name,
               list(last.session.handles))

@@ -114,7 +114,7 @@ TEST_F(ServedCommandTest, RunEqualsDeformUpToFloat32) {
   EXPECT_TRUE(fs::exists(Path("run.json")));
 }
 
-TEST_F(ServedCommandTest, RunTellsTheReactionsAndTheBandThatDeformTells) {
+TEST_F(ServedCommandTest, RunReportsTheReactionsAndTheBandOfDeform) {
   std::ifstream bundled(SourcePath("tests/data/plans/bar/plan.json"));
   Json plan = Json::parse(bundled);
   plan["mesh"] = SourcePath("tests/data/plans/bar/bar.vtu");
@@ -208,7 +208,7 @@ TEST_F(ServedCommandTest, UploadWarnsOfAMeshThatIsProbablyNotInMillimeters) {
   }
 }
 
-TEST_F(ServedCommandTest, WatchTellsOfASessionThatNobodyDrags) {
+TEST_F(ServedCommandTest, WatchReportsASessionWithoutADrag) {
   EXPECT_THAT(OfServer({"watch", "0123456789abcdef"}), FailsWith(1, HasSubstr("no session")));
   ASSERT_OK_AND_ASSIGN(const auto client, TissueformClient::Connect(server_->address(), {}));
   ASSERT_OK_AND_ASSIGN(const auto session, PlanSession::Create(client.get(), tongue_));
@@ -231,7 +231,7 @@ TEST_F(ServedCommandTest, ServerInfoAsTableAndAsJson) {
   EXPECT_EQ(info["models"].size(), 4);
 }
 
-TEST_F(DemoCommandTest, TellsHowTheFaceFollowsAndLeavesResultsAndPictures) {
+TEST_F(DemoCommandTest, ReportsTheMovementOfTheFaceAndWritesResultsAndPictures) {
   ASSERT_EQ(RunDemo("--plan " + kChinPlan + " --seconds 0.5"), 0);
   EXPECT_THAT(
       Read("out.txt"),
@@ -363,7 +363,7 @@ TEST(ServerProcessTest, AProgramThatEndsBeforeItListensIsNamed) {
 }
 
 TEST_F(DemoCommandTest, AnInterruptedDemoEndsItsServer) {
-  // The shell tells its process number and becomes the demo.
+  // The shell prints its process number and becomes the demo.
   const std::string command = "echo $$; exec " + ProgramPath("tissueform") + " demo --out " +
                               folder_.string() + " 2>" + Path("err");
   FILE* demo = popen(command.c_str(), "r");

@@ -162,7 +162,7 @@ Outcome ServedModel::OfCreatePrediction(const std::string& session, const std::s
   if (request_id.size() > kMaxRequestIdBytes || IsNoName(session)) return kInvalidRequest;
   if (const ServedPrediction* earlier = FindPredictionOfRequest(request_id); earlier != nullptr) {
     if (earlier->fingerprint != fingerprint) return kReused;
-    *joined = earlier->told.name();
+    *joined = earlier->reported.name();
     return kFine;
   }
   if (const Outcome known = OfSession(session); !known.ok()) return known;

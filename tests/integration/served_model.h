@@ -64,14 +64,14 @@ struct ServedPrediction {
   std::string session;
   std::string request_id;
   std::string fingerprint;
-  v1::Prediction told;  // when it was made
+  v1::Prediction reported;  // when it was made
 };
 
 struct ServedModel {
   std::set<std::string> meshes;                          // names
   std::map<std::string, ServedSession> sessions;         // by name
   std::map<std::string, ServedPrediction> predictions;   // by name
-  std::map<std::string, v1::Case> cases;                 // by name, as told when sent
+  std::map<std::string, v1::Case> cases;                 // by name, as reported when sent
   std::map<std::string, std::string> names_of_requests;  // of predictions, deleted ones too
 
   int CountMadeFrom(const std::string& mesh) const;

@@ -29,7 +29,7 @@
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 
-// The real program: starts, tells its port, serves, drains.
+// The real program: starts, prints its port, serves, drains.
 namespace tissueform::testing {
 namespace {
 

@@ -5,7 +5,7 @@
 
     tests/integration/service_notices.py FOLDER_OF_PROGRAMS
 
-They listen before they say so, are heard of again and again, tell when they drain, and end with 0.
+They listen before they say so, are heard of again and again, report when they drain, and end with 0.
 """
 
 import os

@@ -21,7 +21,7 @@ using ::testing::ElementsAre;
 class SessionsTest : public ServiceTest {};
 
 // The rest of it is compared by the model (ExpectedSession).
-TEST_F(SessionsTest, ASessionTellsWhatWasMeasured) {
+TEST_F(SessionsTest, ASessionReportsItsMeasurements) {
   const auto client = Connect();
   const v1::Session made = MakeSession(client.get(), BarProblem(1));
   ASSERT_OK_AND_ASSIGN(const v1::Session session, client->GetSession(made.name()));

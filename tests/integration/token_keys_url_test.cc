@@ -145,14 +145,14 @@ TEST_F(TokenKeysUrlTest, NonsenseAtTheStartIsRefused) {
 struct BadUrl {
   const char* name;
   const char* url;
-  const char* told;
+  const char* error;
 };
 
 class BadUrlTest : public ::testing::TestWithParam<BadUrl> {};
 
 TEST_P(BadUrlTest, IsRefusedBeforeAnybodyIsAsked) {
   EXPECT_THAT(CheckJwksUrl(GetParam().url),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().told)));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().error)));
 }
 
 INSTANTIATE_TEST_SUITE_P(

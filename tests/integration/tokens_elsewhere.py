@@ -69,7 +69,7 @@ def check_their_tokens(channel, keys):
         sign = lambda body, **header: jwt.encode(body, private, algorithm, headers={"kid": key["kid"], **header})
         assert ask(channel, bearer(sign(claims()))) == ("OK", ""), algorithm
         good = sign(claims())
-        for forged, told in (
+        for forged, reason in (
             (sign(claims(exp=int(time.time()) - 100)), "expired"),
             (sign(claims(aud="other")), 'audience is "other", and this server is'),
             (sign(claims(iss="https://evil.example")), 'issuer is "https://evil.example"; this server accepts only tokens of'),
@@ -82,7 +82,7 @@ def check_their_tokens(channel, keys):
         ):
             code, details = ask(channel, bearer(forged))
             # A signature's last digit has bits that no byte holds.
-            assert code == "UNAUTHENTICATED" and (told in details or "not a signed" in details), (told, code, details)
+            assert code == "UNAUTHENTICATED" and (reason in details or "not a signed" in details), (reason, code, details)
         assert ask(channel, bearer(good), bearer(good))[0] == "UNAUTHENTICATED", "two headers"
         assert ask(channel, bearer(good)) == ("OK", "")
     assert ask(channel)[0] == "UNAUTHENTICATED", "no token"

@@ -119,7 +119,7 @@ class CheckLayersTest(unittest.TestCase):
     def test_refuses_a_circle_of_scripts(self):
         self.assert_one_error({"deploy/a/one.py": "import two\n", "deploy/a/two.py": "def f():\n    from one import g\n"}, "circle among scripts")
 
-    def test_tells_scripts_of_one_name_apart(self):
+    def test_distinguishes_scripts_with_the_same_name(self):
         self.assertEqual(self.errors({"deploy/a/one.py": "import two\n", "deploy/a/two.py": "", "tests/b/one.py": "", "tests/b/two.py": "import one, json\n"}), [])
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""check_test_names.py tells names from addresses."""
+"""check_test_names.py distinguishes names from addresses."""
 
 import unittest
 

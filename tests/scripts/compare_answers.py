@@ -46,7 +46,7 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader, vtkXMLUnstructured
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PARTS = ("data", "deform", "run", "check", "generate", "build")
 RECIPE_CT = "ct/headsq/headsq_quarter.nhdr"
-# Numbers that tell of the run, not of the answer.
+# Numbers that describe the run, not the answer.
 OF_THE_RUN = re.compile(r"second|_ms$|_us$|time|memory|bytes|threads|^latency|version|commit")
 
 MODELS = {
@@ -268,13 +268,13 @@ def skin_of(mesh, path):
 
 
 class Comparison:
-    """Runs one work on both sides and tells what differs."""
+    """Runs one work on both sides and reports what differs."""
 
     def __init__(self, before, now):
         self.sides = (before, now)
         self.same, self.errors = 0, []
 
-    def tell(self, errors, title):
+    def report(self, errors, title):
         self.errors += errors
         print(f"{'DIFFERENT' if errors else 'same':10} {title}", *(f"\n           {e}" for e in errors), sep="", flush=True)
 
@@ -285,14 +285,14 @@ class Comparison:
         for before, now in zip(befores, nows):
             errors += [f"{now.name}: {difference}" for difference in differences_of_files(before, now)]
         self.same += not errors
-        self.tell(errors, title)
+        self.report(errors, title)
 
     def work(self, title, function, *arguments):
         try:
             befores, nows = (function(side, *arguments) for side in self.sides)
             self.files(title, befores, nows)
         except Failure as failure:
-            self.tell([str(failure)], title)
+            self.report([str(failure)], title)
 
 
 def works_of(parts, before, now, plans, scratch):

@@ -181,7 +181,7 @@ class Machine:
         return resident_mib(self.cluster.process(self.cluster.nodes[0])["pid"])
 
 
-def told(run):
+def print_run(run):
     latency = next(node["latency_ms"] for node in run["load"]["nodes"])
     print(f"{run['kind']:<12} {run['nodes']} servers: {run['frames_per_second']:7.0f} frames/s, {1e3 * run['node_seconds_per_frame']:.3f} ms of a core a frame, "
           f"p50 {latency['p50']:.1f} p99 {latency['p99']:.1f} ms, {run['commits_per_second']:.0f} commits/s; clients {run['busy']['clients']:.2f} HAProxy "
@@ -194,10 +194,10 @@ def measure_turns(options, folder):
     for turn in range(options.turns):
         for nodes in (1, 3, 2):
             with Machine(options, folder / f"turn{turn}", nodes, options.share) as machine:
-                runs.append(told(machine.load("saturated", options.seconds, sessions=round(64 * options.share) * nodes, rate=60, encoding="int16")))
+                runs.append(print_run(machine.load("saturated", options.seconds, sessions=round(64 * options.share) * nodes, rate=60, encoding="int16")))
                 carried = runs[-1]["frames_per_second"]
                 # Seven tenths of that, for how old frames are where there is room.
-                runs.append(told(machine.load("at ease", options.seconds, sessions=max(1, int(0.7 * carried / 60)), rate=60, encoding="int16")))
+                runs.append(print_run(machine.load("at ease", options.seconds, sessions=max(1, int(0.7 * carried / 60)), rate=60, encoding="int16")))
     return runs
 
 
@@ -211,12 +211,12 @@ def measure_rest(options, folder):
         # The first of a head is all of its preparation; the others share it.
         memory = {"idle_mib": before, "session_mib": sessions_mib[0], "shared_session_mib": (sessions_mib[1] - sessions_mib[0]) / (MANY - 1),
                   "prepared_seconds": first["load"]["preparing_seconds"], "prepared_many_seconds": many["load"]["preparing_seconds"]}
-        runs.append(told(machine.load("whole core", seconds, sessions=45, rate=60, encoding="int16")))
-        runs.append(told(machine.load("whole frames", seconds, sessions=40, rate=60)))
-        runs.append(told(machine.load("one drag", seconds, sessions=1, rate=60, encoding="int16")))
-        runs.append(told(machine.load("followers", seconds, sessions=4, followers=40, rate=30, encoding="int16")))
-        runs.append(told(machine.load("no followers", seconds, sessions=4, rate=30, encoding="int16")))
-        runs.append(told(machine.load("commits", seconds, sessions=64, rate=60, encoding="int16", commit_seconds=0.01)))
+        runs.append(print_run(machine.load("whole core", seconds, sessions=45, rate=60, encoding="int16")))
+        runs.append(print_run(machine.load("whole frames", seconds, sessions=40, rate=60)))
+        runs.append(print_run(machine.load("one drag", seconds, sessions=1, rate=60, encoding="int16")))
+        runs.append(print_run(machine.load("followers", seconds, sessions=4, followers=40, rate=30, encoding="int16")))
+        runs.append(print_run(machine.load("no followers", seconds, sessions=4, rate=30, encoding="int16")))
+        runs.append(print_run(machine.load("commits", seconds, sessions=64, rate=60, encoding="int16", commit_seconds=0.01)))
     return runs, memory
 
 

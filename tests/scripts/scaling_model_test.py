@@ -41,11 +41,11 @@ def simulated_wait_p99(streams, utilisation, cores):
 
 
 def run(words):
-    told = io.StringIO()
+    printed = io.StringIO()
     before, sys.argv = sys.argv, ["scaling_model.py", *map(str, words)]
     try:
-        with contextlib.redirect_stdout(told):
-            return model.main(), told.getvalue()
+        with contextlib.redirect_stdout(printed):
+            return model.main(), printed.getvalue()
     finally:
         sys.argv = before
 
@@ -77,8 +77,8 @@ class ScalingModelTest(unittest.TestCase):
         self.assertIn(f"    maxconn {model.PROXY_CONNECTIONS}\n", (ROOT / "deploy/haproxy/cluster.cfg").read_text())
 
     def test_the_document_holds_what_is_printed(self):
-        code, told = run(["--check", ROOT / "docs/scaling.md"])
-        self.assertEqual(code, 0, told)
+        code, printed = run(["--check", ROOT / "docs/scaling.md"])
+        self.assertEqual(code, 0, printed)
 
     def test_other_figures_are_another_document(self):
         figures = json.loads(FIGURES.read_text())
@@ -87,9 +87,9 @@ class ScalingModelTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             other = pathlib.Path(folder) / "other.json"
             other.write_text(json.dumps(figures))
-            code, told = run(["--figures", other, "--check", ROOT / "docs/scaling.md"])
+            code, printed = run(["--figures", other, "--check", ROOT / "docs/scaling.md"])
         self.assertEqual(code, 1)
-        self.assertIn("Measured, and modelled", told)
+        self.assertIn("Measured, and modelled", printed)
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ def changed_files(root, commit):
 
 
 def read_commands(build):
-    """{entry: words of its command}. From the files that CMake writes, since ctest tells no command of a program that is not
+    """{entry: words of its command}. From the files that CMake writes, since ctest reports no command of a program that is not
     built yet."""
     text = "".join(path.read_text(encoding="utf-8") for path in build.rglob("CTestTestfile.cmake"))
     entries = re.findall(r"^add_test\(\[=\[(.+?)\]=\](.*)\)$", text, re.MULTILINE)

@@ -9,7 +9,7 @@ Writes into BUILD_DIR/tidy files batch_N.cc that include some source files each,
 and with all source files by themselves. Prints a line for each batch: its file, a tab, the source files.
 
 Files come together when their commands give no macro two values and when, as far as the first words of their lines
-tell, they name nothing the same, and nothing that a header of the other names: names of unnamed namespaces must meet
+show, they name nothing the same, and nothing that a header of the other names: names of unnamed namespaces must meet
 neither each other nor a header's. A batch that still does not compile is the caller's to take apart.
 """
 

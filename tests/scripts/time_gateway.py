@@ -95,7 +95,7 @@ class Drag:
         return sequence
 
 
-def told(name, values):
+def print_quantiles(name, values):
     ranks = statistics.quantiles(values, n=1000, method="inclusive")
     print(f"{name}: p50 {ranks[499]:.2f} ms, p99 {ranks[989]:.2f} ms, largest {max(values):.2f} ms of {len(values)}", flush=True)
 
@@ -218,7 +218,7 @@ def small_session(server):
 
 
 async def idle_sockets(url, session, count):
-    """Watches that were told how the session is and are told nothing more."""
+    """Watches that received the state of the session and receive nothing more."""
     from tissueform.v1 import deform_service_pb2 as protocol
     sockets = []
     for _ in range(count):
@@ -241,14 +241,14 @@ def start_requests(url, rate, seconds, folder):
 
 
 async def measure(server, url, session, arguments, folder):
-    told("round trip by gRPC", await round_trips_by_grpc(server, session, arguments.seconds))
-    told("round trip through the gateway", await round_trips_by_gateway(url, session, arguments.seconds))
-    told("frame age through the gateway", await picture_ages(url, session, arguments.seconds, arguments.rate))
+    print_quantiles("round trip by gRPC", await round_trips_by_grpc(server, session, arguments.seconds))
+    print_quantiles("round trip through the gateway", await round_trips_by_gateway(url, session, arguments.seconds))
+    print_quantiles("frame age through the gateway", await picture_ages(url, session, arguments.seconds, arguments.rate))
     sockets = await idle_sockets(url, small_session(server), arguments.idle)
     requests = start_requests(url, arguments.requests_per_second, arguments.seconds + 1, folder)
     ages = await picture_ages(url, session, arguments.seconds, arguments.rate)
     out, _ = await asyncio.to_thread(requests.communicate)
-    told(f"frame age beside {len(sockets)} idle sockets and {arguments.requests_per_second} requests a second", ages)
+    print_quantiles(f"frame age beside {len(sockets)} idle sockets and {arguments.requests_per_second} requests a second", ages)
     print(*(line for line in out.splitlines() if line.startswith(("finished", "status", "time for request"))), sep="\n")
     open_ones = sum(socket.open for socket in sockets)
     print(f"idle sockets that are open at the end: {open_ones}")

@@ -49,14 +49,14 @@ def build_once(programs, options, accept_defects):
         command = [programs / "tissueform", "plan", "build", "--ct", options.ct, "--recipe", options.recipe,
                    "--out", f"{folder}/plan", "--stats", f"{folder}/stats.json", "--threads", str(options.threads),
                    "--no-pictures"] + (["--accept-defects"] if accept_defects else [])
-        with open(f"{folder}/told", "w", encoding="utf-8") as told:
+        with open(f"{folder}/output", "w", encoding="utf-8") as output:
             begin = time.perf_counter()
-            process = subprocess.Popen(command, stdout=told, stderr=told)
+            process = subprocess.Popen(command, stdout=output, stderr=output)
             _, status, usage = os.wait4(process.pid, 0)
             wall = time.perf_counter() - begin
             process.returncode = os.waitstatus_to_exitcode(status)
         if process.returncode != 0:
-            sys.exit(f"{programs}: {pathlib.Path(folder, 'told').read_text(encoding='utf-8')[-600:]}")
+            sys.exit(f"{programs}: {pathlib.Path(folder, 'output').read_text(encoding='utf-8')[-600:]}")
         stats = json.loads(pathlib.Path(folder, "stats.json").read_text(encoding="utf-8"))
         report = json.loads(pathlib.Path(folder, "plan/report.json").read_text(encoding="utf-8"))
     seconds = {"wall": wall, "processor": usage.ru_utime + usage.ru_stime}
@@ -89,9 +89,9 @@ def ratios(ours, theirs):
 
 
 def knows_defects(programs):
-    told = subprocess.run([programs / "tissueform", "plan", "build", "--help"], capture_output=True, text=True,
+    output = subprocess.run([programs / "tissueform", "plan", "build", "--help"], capture_output=True, text=True,
                           check=True)
-    return "--accept-defects" in told.stdout
+    return "--accept-defects" in output.stdout
 
 
 def machine():

@@ -16,7 +16,7 @@
 
 // gRPC's side of a call without gRPC: reactions come concurrently from the threads of a pool, in
 // any order that gRPC allows. Everything is code that ThreadSanitizer sees, so that it finds races
-// of a reactor which it cannot tell from the library's own in a test with sockets.
+// of a reactor which it cannot distinguish from the library's own in a test with sockets.
 namespace tissueform::testing {
 
 // What all kinds of calls have in common: operations under way, cancellation and the end.

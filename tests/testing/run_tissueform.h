@@ -17,7 +17,7 @@ namespace tissueform::testing {
 struct ProcessResult {
   int exit_code = -1;  // -1 when a signal ended it
   std::string out;
-  std::string err;  // without what tells of progress
+  std::string err;  // without the lines of progress
 };
 
 // Runs the program that is tested, in `folder`. With a limit it cannot write files beyond that

@@ -24,7 +24,7 @@ struct LoginClient {
 struct LoginTokens {
   std::string access_token = {};
   std::string refresh_token = {};    // empty: none
-  std::chrono::seconds lifetime{0};  // 0: not told
+  std::chrono::seconds lifetime{0};  // 0: not reported
 };
 
 // What the user gets to see: where to go, and what to enter there.

@@ -18,7 +18,7 @@
 namespace tissueform {
 namespace {
 
-absl::Status TellWho(const ServerConnection& server) {
+absl::Status PrintCaller(const ServerConnection& server) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(server));
   TF_ASSIGN_OR_RETURN(const v1::Caller caller, client->access().WhoAmI());
   absl::PrintF("principal  %s\n", caller.principal().empty() ? "(unnamed)" : caller.principal());
@@ -37,7 +37,7 @@ void AddWhoamiCommand(CLI::App& app, CommandWork* work) {
   auto server = std::make_shared<ServerConnection>();
   CLI::App* command = app.add_subcommand(kWhoamiCommand.name, kWhoamiCommand.description);
   AddServerOption(command, server.get());
-  command->callback([server, work] { *work = [server] { return TellWho(*server); }; });
+  command->callback([server, work] { *work = [server] { return PrintCaller(*server); }; });
   command->footer("Example:\n  tissueform whoami --server localhost:50051");
 }
 

@@ -76,7 +76,7 @@ absl::StatusOr<std::vector<ComparedRegion>> LabelledRegions(const TetMeshFile& f
   return regions;
 }
 
-// Nothing where A tells of no band.
+// Empty where A has no band.
 absl::StatusOr<std::optional<WithinBand>> CountWithinBand(const TetMeshFile& a,
                                                           const Eigen::VectorXd& distances) {
   if (FindAttribute(a.point_data, kMaterialUncertaintyArray) == nullptr) return std::nullopt;

@@ -35,7 +35,7 @@ struct CompareOptions {
   int solver_threads = 1;
 };
 
-// How far two results lie apart, by regions, as that command tells it.
+// How far two results lie apart, by regions, as that command reports it.
 
 // Vertices that the report treats as one region.
 struct ComparedRegion {

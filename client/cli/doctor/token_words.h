@@ -12,8 +12,8 @@
 namespace tissueform {
 
 // What the token of the options says of itself: whose it is and how long it lasts. Only a server
-// can tell whether it is valid; this check does not verify its signature, and prints only claims of
-// the token.
+// can decide whether it is valid; this check does not verify its signature, and prints only claims
+// of the token.
 DoctorLine CheckToken(const ConnectionOptions& options, std::chrono::system_clock::time_point now);
 
 }  // namespace tissueform

@@ -29,7 +29,7 @@ absl::StatusOr<SealedPayload> SealPayload(absl::string_view data, const std::str
 
 // The first line of the file, which may end in CR LF. Errors: NotFound (cannot be read),
 // InvalidArgument (shorter than kLeastPasswordLetters or longer than kMaxPasswordBytes, not UTF-8,
-// or more than one line); no message tells a letter of it.
+// or more than one line); no message contains a letter of it.
 absl::StatusOr<std::string> ReadPasswordFile(const std::string& path);
 
 }  // namespace tissueform

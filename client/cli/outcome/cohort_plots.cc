@@ -19,7 +19,7 @@ constexpr double kLeft = 55;
 constexpr double kRight = 445;
 constexpr double kTop = 34;
 constexpr double kBottom = 270;
-// Okabe and Ito's, which users with a color vision deficiency can tell apart.
+// Okabe and Ito's, which users with a color vision deficiency can distinguish.
 constexpr std::array<const char*, 6> kColors = {"#0072b2", "#d55e00", "#009e73",
                                                 "#cc79a7", "#e69f00", "#56b4e9"};
 

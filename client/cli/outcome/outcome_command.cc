@@ -82,7 +82,7 @@ absl::StatusOr<Outcome> Compare(const OutcomeArguments& arguments, const PreOper
   options.threads = arguments.post.threads;
   options.accept_findings = arguments.accept_findings;
   options.settings = arguments.calibrate;
-  options.tell = [&progress](absl::string_view stage) {
+  options.on_stage = [&progress](absl::string_view stage) {
     progress.reset();
     progress.emplace(std::string(stage));
   };

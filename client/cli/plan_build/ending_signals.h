@@ -28,8 +28,8 @@ class EndingSignals {
   // Whether one has arrived. Any thread.
   bool arrived() const;
 
-  // Ends this process as one that a signal has told to end, with exit code 128 + signal and without
-  // any clearing up. REQUIRES: one has arrived.
+  // Ends this process as the signal that arrived demands: with exit code 128 + signal and without
+  // any cleanup. REQUIRES: one has arrived.
   [[noreturn]] void EndByArrived() const;
 
  private:

@@ -29,9 +29,9 @@ namespace {
 // Of the whole work's time: what building, without writing and the report, takes.
 constexpr double kBuildShare = 0.8;
 
-StageFunction Within(const StageFunction& tell, double from, double to) {
-  return [tell, from, to](absl::string_view stage, double fraction) {
-    if (stage != "done") tell(stage, from + (to - from) * fraction);
+StageFunction Within(const StageFunction& on_stage, double from, double to) {
+  return [on_stage, from, to](absl::string_view stage, double fraction) {
+    if (stage != "done") on_stage(stage, from + (to - from) * fraction);
   };
 }
 
@@ -86,8 +86,9 @@ absl::StatusOr<std::string> ResolveCt(const PlanBuildRequest& request, ZipInputs
 }
 
 absl::StatusOr<PlanBuild> BuildFromInput(const PlanBuildRequest& request,
-                                         const StageFunction& tell) {
-  const PlanBuildOptions options{.threads = request.threads, .tell = Within(tell, 0, kBuildShare)};
+                                         const StageFunction& on_stage) {
+  const PlanBuildOptions options{.threads = request.threads,
+                                 .on_stage = Within(on_stage, 0, kBuildShare)};
   // The caller removes the folder after an error, also when this process is killed.
   ZipInputs zips(request.folder);
   if (!request.surfaces.empty()) {
@@ -101,18 +102,18 @@ absl::StatusOr<PlanBuild> BuildFromInput(const PlanBuildRequest& request,
 }
 
 absl::StatusOr<PlanBuildAnswer> CompareRequestedLabels(const PlanBuildRequest& request,
-                                                       const StageFunction& tell) {
+                                                       const StageFunction& on_stage) {
   ZipInputs zips(request.folder);
   TF_ASSIGN_OR_RETURN(Recipe recipe, RecipeOf(request));
   TF_ASSIGN_OR_RETURN(const std::string ct, ResolveCt(request, &zips, &recipe));
   TF_ASSIGN_OR_RETURN(const PlanLabels labels,
-                      CompareWithLabels(ct, recipe, {request.threads, tell}));
+                      CompareWithLabels(ct, recipe, {request.threads, on_stage}));
   return PlanBuildAnswer{.text = LabelsText(labels), .ready = true, .defects = {}};
 }
 
 absl::StatusOr<PlanBuildAnswer> WriteRequestedInputs(const PlanBuildRequest& request,
-                                                     const StageFunction& tell) {
-  tell("reading the inputs", 0);
+                                                     const StageFunction& on_stage) {
+  on_stage("reading the inputs", 0);
   ZipInputs zips(request.folder);
   TF_ASSIGN_OR_RETURN(const std::vector<std::string> notes, WriteBuildInputs(request, &zips));
   PlanBuildAnswer made{.text = {}, .ready = true, .defects = {}};
@@ -121,9 +122,9 @@ absl::StatusOr<PlanBuildAnswer> WriteRequestedInputs(const PlanBuildRequest& req
 }
 
 absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& request,
-                                                   const StageFunction& tell) {
-  if (request.only_compare_labels) return CompareRequestedLabels(request, tell);
-  if (request.only_write_inputs) return WriteRequestedInputs(request, tell);
+                                                   const StageFunction& on_stage) {
+  if (request.only_compare_labels) return CompareRequestedLabels(request, on_stage);
+  if (request.only_write_inputs) return WriteRequestedInputs(request, on_stage);
   // As deform does: the last digits would depend on their number, and with them what the trial of
   // the planned move finds torn. Threads that wait for each other also cost more than they give.
   SetBlasThreads(1);
@@ -132,13 +133,13 @@ absl::StatusOr<PlanBuildAnswer> BuildRequestedPlan(const PlanBuildRequest& reque
     // First, so that a missing program is reported before the work.
     TF_ASSIGN_OR_RETURN(display, VirtualDisplay::Open());
   }
-  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildFromInput(request, tell));
-  tell("writing the plan", kBuildShare);
+  TF_ASSIGN_OR_RETURN(const PlanBuild build, BuildFromInput(request, on_stage));
+  on_stage("writing the plan", kBuildShare);
   TF_RETURN_IF_ERROR(WritePlan(build, request.folder));
   TF_RETURN_IF_ERROR(WritePlanReport(build,
                                      {.program_version = kVersion,
                                       .pictures = request.pictures,
-                                      .tell = Within(tell, kBuildShare + 0.05, 1)},
+                                      .on_stage = Within(on_stage, kBuildShare + 0.05, 1)},
                                      request.folder));
   return Outcome(request, build);
 }

@@ -76,8 +76,8 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, const Deviations& 
   std::shared_ptr<MeshPreparation> preparation;
   std::unique_ptr<Deformer> deformer;
   {
-    // One unless told otherwise: more make a large factorisation faster, but the last digits of the
-    // answer depend on how many there are (docs/performance.md).
+    // One unless configured otherwise: more make a large factorisation faster, but the last digits
+    // of the answer depend on how many there are (docs/performance.md).
     const BlasThreadsScope factorising(stats->solver_threads);
     const StageProgress progress("preparing the deformer");
     TF_ASSIGN_OR_RETURN(

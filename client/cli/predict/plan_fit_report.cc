@@ -167,7 +167,7 @@ absl::Status CheckReached(const FitReport& report) {
     if (report.fit->targets[t].missed_mm > report.fit->targets[worst].missed_mm) worst = t;
   }
   if (missed == 0) return absl::OkStatus();
-  const auto told = [&report](size_t t) {
+  const auto miss_of = [&report](size_t t) {
     return absl::StrFormat("\"%s\" by %.2f mm", report.problem->targets[t].name,
                            report.fit->targets[t].missed_mm);
   };
@@ -175,10 +175,10 @@ absl::Status CheckReached(const FitReport& report) {
       absl::StrCat(missed, " of ", report.fit->targets.size(), " targets cannot be reached: ");
   if (!report.fit->contradictions.empty()) {
     const auto [a, b] = report.fit->contradictions.front();
-    absl::StrAppend(&message, "missed: ", told(a), " and ", told(b),
+    absl::StrAppend(&message, "missed: ", miss_of(a), " and ", miss_of(b),
                     ", which contradict each other");
   } else {
-    absl::StrAppend(&message, "largest miss: ", told(worst));
+    absl::StrAppend(&message, "largest miss: ", miss_of(worst));
   }
   std::vector<std::string> held;
   for (size_t i = 0; i < report.fit->unknowns.size(); ++i) {

@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// A fit with all that its reports tell.
+// A fit with all that its reports state.
 struct FitReport {
   std::string plan_path;
   std::string targets_path;

@@ -24,8 +24,8 @@ using OpenPlanner = std::function<absl::StatusOr<OpenedPlanner>(
 
 // `demo [--out DIR] [--plan PLAN] [--port N] [--no-browser]`: the main job on the bundled head, end
 // to end. Starts the tissueform-server that lies beside this program on loopback, uploads, streams
-// a drag, tells what it means, writes and draws what came back. With --serve the server stays, with
-// the planner that `open_planner` opens in front of it.
+// a drag, reports what it means, writes and draws what came back. With --serve the server stays,
+// with the planner that `open_planner` opens in front of it.
 void AddDemoCommand(CLI::App& app, OpenPlanner open_planner, CommandWork* work);
 
 }  // namespace tissueform

@@ -181,24 +181,25 @@ absl::Status Compare(const PredictionOptions& options) {
   TF_ASSIGN_OR_RETURN(const ComparedPredictions compared,
                       client->predictions().Compare(options.FullPrediction(), other,
                                                     /*differences=*/false, vertices));
-  const v1::PredictionComparison& told = compared.comparison;
-  const DistanceSummary distances = ToDistanceSummary(told.distances());
+  const v1::PredictionComparison& comparison = compared.comparison;
+  const DistanceSummary distances = ToDistanceSummary(comparison.distances());
   if (options.json) {
-    PrintJsonReport({{"prediction", told.prediction()},
-                     {"model", ModelText(told.model())},
-                     {"other_prediction", told.other_prediction()},
-                     {"other_model", ModelText(told.other_model())},
+    PrintJsonReport({{"prediction", comparison.prediction()},
+                     {"model", ModelText(comparison.model())},
+                     {"other_prediction", comparison.other_prediction()},
+                     {"other_model", ModelText(comparison.other_model())},
                      {"vertices", where},
                      {"distances", DistancesToJson(distances)},
-                     {"worst_vertex", told.distances().worst_vertex()}});
+                     {"worst_vertex", comparison.distances().worst_vertex()}});
     return absl::OkStatus();
   }
-  absl::PrintF("%s (%s) and %s (%s), in mm\n", told.prediction(), ModelText(told.model()),
-               told.other_prediction().empty() ? "its session now" : told.other_prediction(),
-               ModelText(told.other_model()));
+  absl::PrintF(
+      "%s (%s) and %s (%s), in mm\n", comparison.prediction(), ModelText(comparison.model()),
+      comparison.other_prediction().empty() ? "its session now" : comparison.other_prediction(),
+      ModelText(comparison.other_model()));
   PrintDistanceHeadline();
   PrintDistances({{where, distances}});
-  absl::PrintF("farthest at vertex %d\n", told.distances().worst_vertex());
+  absl::PrintF("farthest at vertex %d\n", comparison.distances().worst_vertex());
   return absl::OkStatus();
 }
 

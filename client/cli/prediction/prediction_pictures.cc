@@ -112,7 +112,7 @@ Figure FigureOf(const BeforeAndAfter& what, const NamedView& view) {
   return figure;
 }
 
-// "Lower jaw 8.0 mm and 2.1°": of its pivot, as a planner tells it.
+// "Lower jaw 8.0 mm and 2.1°": of its pivot, as a planner states it.
 std::string MoveInTitle(const CaseHandle& handle, const HandlePose& pose) {
   const double mm = (ApplyPose(pose, handle.pivot_mm) - handle.pivot_mm).norm();
   const double deg = pose.rotation_vector.norm() * 180 / M_PI;

@@ -38,11 +38,11 @@ bool IsOver(const v1::Export& sent) {
 // Until it is done, with a line for every change.
 absl::Status WaitForEnd(ExportCalls* calls, const std::string& name) {
   const std::unique_ptr<ExportWatchStream> watch = calls->Watch();
-  bool told_all = false;
+  bool received_all = false;
   while (const auto response = watch->Receive()) {
     v1::Export sent = response->export_();
-    if (!response->has_export_() && !told_all) {
-      told_all = true;
+    if (!response->has_export_() && !received_all) {
+      received_all = true;
       TF_ASSIGN_OR_RETURN(sent, calls->Get(name));  // it may have been done before the watch
       if (!IsOver(sent)) continue;
     }

@@ -155,7 +155,7 @@ class ServerBuild {
     TF_RETURN_IF_ERROR(cancellation_.Check());
     TF_ASSIGN_OR_RETURN(const v1::PlanBuild created, calls_->Create(request));
     absl::StatusOr<v1::PlanBuild> done = calls_->Wait(
-        created.name(), [this](const v1::PlanBuild& build) { Tell(build); }, cancellation_);
+        created.name(), [this](const v1::PlanBuild& build) { Report(build); }, cancellation_);
     if (cancellation_.requested()) {
       // Also where it is done by now: its result is not wanted.
       TF_RETURN_IF_ERROR(calls_->Cancel(created.name()).status());
@@ -170,7 +170,7 @@ class ServerBuild {
   }
 
   // Only what has changed: the server sends its state twice a second.
-  void Tell(const v1::PlanBuild& build) {
+  void Report(const v1::PlanBuild& build) {
     std::string stage = build.stage();
     if (build.state() == v1::PLAN_BUILD_STATE_WAITING) {
       stage =

@@ -19,7 +19,7 @@ struct ServerBuildResult {
   std::string notes;  // lines about the CT that only this machine knows
 };
 
-// Builds a plan on a server and writes its files into inputs.out, all or nothing; tells on stderr
+// Builds a plan on a server and writes its files into inputs.out, all or nothing; reports on stderr
 // how far it is. Once one of `signals` has arrived it ends the build on the server and returns
 // Cancelled.
 //

@@ -75,7 +75,7 @@ void Note(const v1::DeformFrame& frame, double latency_ms, DragTotals* totals) {
   }
 }
 
-// Tells what happens to the connection, on the receiving thread.
+// Reports what happens to the connection, on the receiving thread.
 ReattachingStream::Options StreamOptions(const PlanProblem& problem,
                                          const DragCommandOptions& options, DragTotals* totals) {
   ReattachingStream::Options stream;

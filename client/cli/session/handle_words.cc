@@ -15,7 +15,7 @@ namespace tissueform {
 namespace {
 
 // Only along an axis, with less than 8 degrees beside it (cosine 0.99): "forward" for a move that
-// also goes up would tell half of it.
+// also goes up would state half of it.
 std::string DirectionInWords(const Eigen::Vector3d& move) {
   struct AxisWords {
     const char* negative;

@@ -22,7 +22,7 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr char kListening[] = "listening on ";
-// More than a server may take that drains without being told how long.
+// More than a server takes to drain if its drain time is not configured.
 constexpr std::chrono::seconds kEndGrace{30};
 
 }  // namespace

@@ -111,7 +111,7 @@ absl::Status Update(const SessionOptions& options) {
   if (options.poisson_ratio.has_value()) request.set_poisson_ratio(*options.poisson_ratio);
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   if (!options.regions.empty()) TF_RETURN_IF_ERROR(SetRegions(options, client.get(), &request));
-  TF_ASSIGN_OR_RETURN(const v1::Session session, UpdateAndTell(client.get(), request));
+  TF_ASSIGN_OR_RETURN(const v1::Session session, UpdateWithProgress(client.get(), request));
   absl::PrintF("prepared %s again: %s, handles %s, %d vertices fixed, etag %s\n", session.name(),
                ModelText(session.model()), absl::StrJoin(session.handles(), ", "),
                session.fixed_vertex_count(), session.etag());

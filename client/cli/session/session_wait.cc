@@ -9,10 +9,10 @@
 namespace tissueform {
 namespace {
 
-PreparationWait WaitAndTell(StageProgress* progress, const std::atomic<bool>* stop) {
+PreparationWait WaitWithProgress(StageProgress* progress, const std::atomic<bool>* stop) {
   PreparationWait wait;
   wait.on_progress = [progress](const v1::PreparationProgress& news) {
-    progress->Tell(ProgressText(news));
+    progress->Report(ProgressText(news));
   };
   if (stop != nullptr) {
     wait.cancellation = Cancellation([stop] { return stop->load(); });
@@ -27,15 +27,15 @@ absl::StatusOr<std::unique_ptr<PlanSession>> MakePlanSession(TissueformClient* c
                                                              const std::atomic<bool>* stop,
                                                              const DeformStream::Options* stream) {
   StageProgress progress("uploading and preparing the session");
-  return PlanSession::Create(client, problem, WaitAndTell(&progress, stop), stream);
+  return PlanSession::Create(client, problem, WaitWithProgress(&progress, stop), stream);
 }
 
-absl::StatusOr<v1::Session> UpdateAndTell(TissueformClient* client,
-                                          const v1::UpdateSessionRequest& request) {
+absl::StatusOr<v1::Session> UpdateWithProgress(TissueformClient* client,
+                                               const v1::UpdateSessionRequest& request) {
   StageProgress progress("preparing the session");
   v1::PrepareSessionRequest preparation;
   *preparation.mutable_update() = request;
-  return client->PrepareSession(preparation, WaitAndTell(&progress, nullptr));
+  return client->PrepareSession(preparation, WaitWithProgress(&progress, nullptr));
 }
 
 }  // namespace tissueform

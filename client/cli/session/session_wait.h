@@ -17,7 +17,7 @@
 // Sessions for a user at a terminal.
 namespace tissueform {
 
-// PlanSession::Create; tells on stderr how far it is when that takes longer than a second. Ends
+// PlanSession::Create; reports on stderr how far it is when that takes longer than a second. Ends
 // with Cancelled once `stop` (may be null) is set. `stream` (may be null): what will be asked
 // of the session next. One at a time.
 absl::StatusOr<std::unique_ptr<PlanSession>> MakePlanSession(
@@ -25,7 +25,7 @@ absl::StatusOr<std::unique_ptr<PlanSession>> MakePlanSession(
     const DeformStream::Options* stream = nullptr);
 
 // TissueformClient::UpdateSession in the same way.
-absl::StatusOr<v1::Session> UpdateAndTell(TissueformClient* client,
-                                          const v1::UpdateSessionRequest& request);
+absl::StatusOr<v1::Session> UpdateWithProgress(TissueformClient* client,
+                                               const v1::UpdateSessionRequest& request);
 
 }  // namespace tissueform

@@ -51,10 +51,10 @@ void UploadLines::Resumed(const std::string& line) {
 void UploadLines::Progress(int64_t sent_bytes, int64_t total_bytes) {
   const double now_s = seconds_();
   // The last one ends what has begun: what follows is the server's checking.
-  const bool ends = told_ && sent_bytes == total_bytes;
+  const bool ends = has_printed_ && sent_bytes == total_bytes;
   if (now_s < next_s_ && !ends) return;
   next_s_ = now_s + 1;
-  told_ = true;
+  has_printed_ = true;
   print_(absl::StrCat("uploading: ", PartOf(sent_bytes, total_bytes)));
 }
 

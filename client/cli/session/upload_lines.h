@@ -14,7 +14,7 @@
 
 namespace tissueform {
 
-// Tells in lines how an upload goes: how far it is, a line a second once it has taken longer than
+// Reports in lines how an upload goes: how far it is, a line a second once it has taken longer than
 // one; that it was interrupted, not at every attempt; that it goes on, and where.
 class UploadLines {
  public:
@@ -24,7 +24,7 @@ class UploadLines {
   UploadLines(Print print, Seconds seconds)
       : print_(std::move(print)), seconds_(std::move(seconds)) {}
 
-  // What tells them. The object must outlive it.
+  // Options that print these lines. The object must outlive it.
   UploadOptions Options();
 
  private:
@@ -35,7 +35,7 @@ class UploadLines {
   const Print print_;
   const Seconds seconds_;
   double next_s_ = 1;
-  bool told_ = false;
+  bool has_printed_ = false;
   absl::StatusCode interrupted_by_ = absl::StatusCode::kOk;
   double interrupted_s_ = 0;
   std::string resumed_;  // the last line of it since an interruption was reported

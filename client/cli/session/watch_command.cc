@@ -81,7 +81,7 @@ class Seen {
   int64_t time_ns_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
-void TellNotice(const v1::DeformNotice& notice) {
+void PrintNotice(const v1::DeformNotice& notice) {
   if (notice.has_draining()) {
     absl::PrintF("the server shuts down at %s at the latest\n",
                  google::protobuf::util::TimeUtil::ToString(notice.draining().end_time()));
@@ -103,7 +103,7 @@ absl::Status Run(const WatchCommandOptions& options) {
   TF_ASSIGN_OR_RETURN(const auto client, ConnectTo(options.server));
   const std::string session = FullSessionName(options.session);
   ReattachingWatch::Options watching;
-  watching.watch.on_notice = TellNotice;
+  watching.watch.on_notice = PrintNotice;
   watching.reattachment.on_detached = [](const absl::Status& why) {
     absl::PrintF("%s\n", DetachedText(why));
   };

@@ -16,9 +16,9 @@
 
 namespace tissueform {
 
-// What results of linear_elastic and neo_hookean tell beyond positions, in files and in statistics.
-// All of it is found from the positions, so answers of a server, which come in single precision,
-// have it as well.
+// What results of linear_elastic and neo_hookean report beyond positions, in files and in
+// statistics. All of it is found from the positions, so answers of a server, which come in single
+// precision, have it as well.
 
 // Cell arrays; the latter in single precision.
 inline constexpr char kVonMisesStressArray[] = "von_mises_stress_pa";

@@ -44,7 +44,7 @@ Attribute SealArray(const LipEdge& edge, const SealAnswer& seal, Eigen::Index nu
   return {kLipSealArray, 1, std::move(of_vertex)};
 }
 
-// Where the plan's mesh tells of contact, its result tells that it has none.
+// Where the plan's mesh marks contact, its result marks that it has none.
 void MarkContactAsLeftOut(std::vector<Attribute>* point_data, Eigen::Index num_vertices) {
   for (Attribute& array : *point_data) {
     if (array.name != kContactArray) continue;

@@ -36,7 +36,7 @@ bool StageProgress::AnnounceUnlessShort(const std::future<void>& end) {
   return true;
 }
 
-void StageProgress::Tell(std::string news) {
+void StageProgress::Report(std::string news) {
   MutexLock lock(mutex_);
   news_ = std::move(news);
   if (printed_at_seconds_ >= 0 &&

@@ -11,7 +11,7 @@
 
 namespace tissueform {
 
-// Tells on stderr that a stage is at work when it takes longer than a second, then at most once a
+// Reports on stderr that a stage is at work when it takes longer than a second, then at most once a
 // second what it is at, and how long it took when it ends. Short stages say nothing. One at a time.
 class StageProgress {
  public:
@@ -21,7 +21,7 @@ class StageProgress {
   StageProgress& operator=(const StageProgress&) = delete;
 
   // What it is at. Any thread.
-  void Tell(std::string news) ABSL_LOCKS_EXCLUDED(mutex_);
+  void Report(std::string news) ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
   bool AnnounceUnlessShort(const std::future<void>& end) ABSL_LOCKS_EXCLUDED(mutex_);

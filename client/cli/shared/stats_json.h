@@ -19,7 +19,7 @@
 
 namespace tissueform {
 
-// What STATS.json tells of one prediction.
+// What STATS.json reports about one prediction.
 struct PredictionStats {
   std::string model;         // as in the plan
   std::string rotation;      // mode of the gradient field

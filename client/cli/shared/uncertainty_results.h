@@ -20,7 +20,7 @@
 namespace tissueform {
 
 // The band of uncertainty that results of linear_elastic and neo_hookean have where the plan gives
-// ranges of its material (uncertainty_text.h tells it).
+// ranges of its material (uncertainty_text.h reports it).
 
 // Point arrays.
 inline constexpr char kMaterialUncertaintyArray[] = "material_uncertainty_p95_mm";

@@ -40,12 +40,13 @@ absl::StatusOr<std::vector<ModelAnswer>> AnswerByAllModels(
 
 absl::StatusOr<std::vector<ModelAnswer>> AnswerByReferences(
     const AccuracyCase& problem, double poisson_ratio, const std::string& folder,
-    const std::function<void(const std::string&)>& tell) {
+    const std::function<void(const std::string&)>& on_step) {
   std::vector<ModelAnswer> answers;
   for (const CalculixLaw law : {CalculixLaw::kLinear, CalculixLaw::kNeoHookean}) {
     absl::StatusOr<ModelAnswer> answer = AnswerByCalculix(law, problem, poisson_ratio, folder);
     if (absl::IsInternal(answer.status())) {
-      tell(absl::StrCat(problem.name, ", nu = ", poisson_ratio, ": ", answer.status().message()));
+      on_step(
+          absl::StrCat(problem.name, ", nu = ", poisson_ratio, ": ", answer.status().message()));
       continue;
     }
     TF_RETURN_IF_ERROR(answer.status());
@@ -66,15 +67,15 @@ const ModelAnswer* AccuracyResult::Model(const std::string& name) const {
 
 absl::StatusOr<std::vector<AccuracyResult>> RunAccuracyCase(
     const AccuracyCase& problem, const std::vector<double>& poisson_ratios,
-    const std::string& folder, const std::function<void(const std::string&)>& tell) {
+    const std::string& folder, const std::function<void(const std::string&)>& on_step) {
   std::vector<AccuracyResult> results;
   std::map<std::string, ModelAnswer> same_for_all;
   for (const double poisson_ratio : poisson_ratios) {
-    tell(absl::StrCat(problem.name, ", nu = ", poisson_ratio, " ..."));
+    on_step(absl::StrCat(problem.name, ", nu = ", poisson_ratio, " ..."));
     AccuracyResult result;
     result.poisson_ratio = poisson_ratio;
     TF_ASSIGN_OR_RETURN(result.references,
-                        AnswerByReferences(problem, poisson_ratio, folder, tell));
+                        AnswerByReferences(problem, poisson_ratio, folder, on_step));
     TF_ASSIGN_OR_RETURN(result.models, AnswerByAllModels(problem, poisson_ratio, &same_for_all));
     results.push_back(std::move(result));
   }

@@ -26,10 +26,10 @@ struct AccuracyResult {
 
 // Solves the case at every Poisson's ratio by every model and by CalculiX, in `folder`. A
 // reference that CalculiX does not find is reported and left out; a missing program is an error.
-// `tell` gets a line for every step.
+// `on_step` gets a line for every step.
 absl::StatusOr<std::vector<AccuracyResult>> RunAccuracyCase(
     const AccuracyCase& problem, const std::vector<double>& poisson_ratios,
-    const std::string& folder, const std::function<void(const std::string&)>& tell);
+    const std::string& folder, const std::function<void(const std::string&)>& on_step);
 
 // The largest way of a vertex under a reference, mm: what distances are to be seen against.
 double LargestDisplacement(const AccuracyCase& problem, const ModelAnswer& reference);

@@ -50,7 +50,7 @@ cholmod_sparse ViewLowerTriangle(const SparseMatrix& A) {
 DirectCholmod::DirectCholmod() : state_(std::make_unique<State>()) {
   cholmod_common& common = state_->common;
   cholmod_start(&common);
-  // Ours to the letter (core/mechanics/linear_solvers/cholmod_cholesky.cc): the ratio tells what
+  // Ours to the letter (core/mechanics/linear_solvers/cholmod_cholesky.cc): the ratio shows what
   // lies around the library, not which ordering is luckier.
   common.supernodal = CHOLMOD_SUPERNODAL;
   common.nmethods = 1;

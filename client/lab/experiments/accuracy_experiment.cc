@@ -75,7 +75,7 @@ absl::StatusOr<AccuracySweep> RunCase(const AccuracyCase& problem, const std::st
   AccuracySweep sweep;
   sweep.name = problem.name;
   TF_ASSIGN_OR_RETURN(sweep.results,
-                      RunAccuracyCase(problem, problem.poisson_ratios, scratch, options.tell));
+                      RunAccuracyCase(problem, problem.poisson_ratios, scratch, options.on_step));
   AddAccuracyRows(problem, sweep.results, &tables->all);
   AddMovementRows(problem, sweep.results, &tables->movements);
   const AccuracyResult& shown = ShownResult(sweep.results);

@@ -23,10 +23,10 @@ struct ExperimentOptions {
   // Of the experiment "ratios": plan files besides the bundled ones.
   std::vector<std::string> plans;
   // Gets a line for every step of a long experiment. May be empty.
-  std::function<void(const std::string&)> tell;
+  std::function<void(const std::string&)> on_step;
 
-  void Tell(const std::string& line) const {
-    if (tell) tell(line);
+  void Report(const std::string& line) const {
+    if (on_step) on_step(line);
   }
 
   std::string Path(absl::string_view name) const { return folder + "/" + std::string(name); }

@@ -80,7 +80,7 @@ ExperimentOptions OptionsFor(const ExperimentsOptions& options) {
   result.find_plan = FindBundledPlan;
   result.cases = options.cases;
   result.plans = options.plans;
-  result.tell = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
+  result.on_step = [](const std::string& line) { absl::FPrintF(stderr, "%s\n", line); };
   return result;
 }
 

@@ -103,7 +103,7 @@ absl::Status RunLipsExperiment(const ExperimentOptions& options) {
   CsvTable table({"case", "model", "rows", "open", "largest_mm", "distance_mm", "distance_percent",
                   "force_n_of_calculix"});
   for (const Comparison& comparison : comparisons) {
-    options.Tell(absl::StrCat("lips: ", comparison.problem.name));
+    options.Report(absl::StrCat("lips: ", comparison.problem.name));
     TF_RETURN_IF_ERROR(AddRow(comparison, scratch.path(), &table));
   }
   absl::PrintF("%s", table.Markdown());

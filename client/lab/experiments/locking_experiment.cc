@@ -203,9 +203,9 @@ LockingError ErrorAgainstFiner(const Positions& coarse_displacements,
 }
 
 absl::Status RunLockingExperiment(const ExperimentOptions& options) {
-  options.Tell("locking: bar in pure bending ...");
+  options.Report("locking: bar in pure bending ...");
   TF_ASSIGN_OR_RETURN(const std::vector<LockingRow> bending, BendingRows());
-  options.Tell("locking: layered block against a finer one ...");
+  options.Report("locking: layered block against a finer one ...");
   TF_ASSIGN_OR_RETURN(const std::vector<LockingRow> block, BlockRows());
   std::vector<LockingRow> all = bending;
   all.insert(all.end(), block.begin(), block.end());

@@ -246,14 +246,14 @@ absl::Status RunRatiosExperiment(const ExperimentOptions& options) {
   SetBlasThreads(1);
   CsvTable table = RatioTable();
   for (const char* name : kBundled) {
-    options.Tell(absl::StrCat("ratios: ", name));
+    options.Report(absl::StrCat("ratios: ", name));
     TF_ASSIGN_OR_RETURN(const std::string path, options.find_plan(name));
     TF_RETURN_IF_ERROR(AddRatiosOfPlan(name, path, options.threads, &table));
   }
   for (const std::string& path : options.plans) {
     // The folder of a plan may be named after a patient, so the table counts them.
     const std::string name = absl::StrCat("plan ", 1 + (&path - options.plans.data()));
-    options.Tell(absl::StrCat("ratios: ", name));
+    options.Report(absl::StrCat("ratios: ", name));
     TF_RETURN_IF_ERROR(AddRatiosOfPlan(name, path, options.threads, &table));
   }
   absl::PrintF("%s", Colored(table.Markdown()));

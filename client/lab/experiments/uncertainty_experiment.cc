@@ -172,8 +172,8 @@ absl::Status Draw(const Study& study, const Positions& positions, const Eigen::V
 }
 
 absl::Status Run(const Study& study, const ExperimentOptions& options, CsvTable* table) {
-  options.Tell(absl::StrFormat("%s, %s, factor %g: %d answers in full", study.problem.name,
-                               study.model.name, study.factor, kSamples));
+  options.Report(absl::StrFormat("%s, %s, factor %g: %d answers in full", study.problem.name,
+                                 study.model.name, study.factor, kSamples));
   TF_ASSIGN_OR_RETURN(const Answer middle, Solve(study, study.problem.stiffness, {}));
   TF_ASSIGN_OR_RETURN(const AnswerExpansion expansion, Expand(study, middle));
   const Eigen::VectorXd band =

@@ -35,7 +35,7 @@ struct NodeLoad {
   int64_t coalesced = 0;  // poses that newer ones had replaced, as its frames say
   int64_t watch_frames = 0;
   std::vector<double> latencies_ms;     // from a pose's sending to its frame
-  std::vector<double> solves_ms;        // as the node tells them
+  std::vector<double> solves_ms;        // as the node reports them
   std::vector<double> commits_ms;       // from a pose's sending to its acknowledgement
   std::vector<double> watch_delays_ms;  // of followers' frames, by the clocks of both machines
 };

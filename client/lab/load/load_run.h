@@ -38,7 +38,7 @@ struct DragLoad {
   int64_t bytes = 0;                    // of positions
   std::vector<double> picture_ages_ms;  // of all drags; see PictureAges
   std::vector<double> latencies_ms;     // of the frames that came, until they were taken
-  std::vector<double> solves_ms;        // as the server tells them
+  std::vector<double> solves_ms;        // as the server reports them
 };
 
 struct LoadResult {
@@ -50,7 +50,7 @@ struct LoadResult {
 };
 
 // Runs it against `server`. Errors while the drags are prepared; later ones are
-// told in the result.
+// reported in the result.
 absl::StatusOr<LoadResult> RunLoad(const ServerConnection& server, const PlanProblem& problem,
                                    const LoadOptions& options);
 

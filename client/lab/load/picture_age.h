@@ -18,7 +18,7 @@ struct ShownFrame {
 // How old the picture of a drag was, every `step_ms` from the first pose on until `end_ms`: now
 // minus the send time of the newest pose that is shown, and before any is shown, minus that of the
 // first pose. What a user feels: poses that were dropped count, which the latency of the frames
-// that came does not tell.
+// that came does not show.
 //
 // `frames` in the order in which they were shown.
 std::vector<double> PictureAges(double first_sent_ms, double end_ms,

@@ -25,7 +25,7 @@ int SinceVersion(const nlohmann::json& subschema);
 nlohmann::json SchemaOfVersion(const nlohmann::json& published, int version);
 
 // By which version a document is to be checked: by the one that it says. One that says none, or
-// nothing that is a version, is left to the newest schema, which tells what is wrong with it.
+// nothing that is a version, is left to the newest schema, which reports what is wrong with it.
 //
 // Errors: InvalidArgument for a document of this format and a version above the newest.
 absl::StatusOr<int> VersionToCheck(const nlohmann::json& document, const nlohmann::json& published);

@@ -59,7 +59,7 @@ absl::Status CallHelper(const HelperCall& call,
   request.Number(call.limits.max_memory_bytes);
   request.Number(call.limits.max_seconds);
   request.Number(call.limits.max_file_bytes);
-  send(&request);  // where that fails, how the helper ended tells more
+  send(&request);  // where that fails, how the helper ended says more
   const absl::Status received = receive(helper->answer());
   if (absl::IsDataLoss(received)) {
     // An answer without sense may come from a helper that still runs.

@@ -239,18 +239,18 @@ absl::Status CheckLowerJawInView(const BoneParts& parts) {
 
 absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
                                             const std::optional<Plane>& given_cut,
-                                            const StageFunction& tell) {
-  TellStage(tell, "finding the mandible", 0);
+                                            const StageFunction& on_stage) {
+  ReportStage(on_stage, "finding the mandible", 0);
   BoneParts result;
   std::optional<Markers> found = FindMarkers(head, nullptr);
   const std::optional<DentalCut> cut = ChooseCut(head, found, given_cut, &result);
   if (cut.has_value()) {
-    TellStage(tell, "separating the teeth", 0.3);
+    ReportStage(on_stage, "separating the teeth", 0.3);
     found = FindMarkers(head, &*cut);
   }
   if (!found.has_value()) return NoLowerJaw();
   const Markers& markers = *found;
-  TellStage(tell, "growing the bone parts", 0.5);
+  ReportStage(on_stage, "growing the bone parts", 0.5);
   result.marker_hu = markers.threshold_hu;
   const DentalCut* const used_cut = cut.has_value() ? &*cut : nullptr;
   const LabelGrid seeds = MarkerLabels(markers, PiecesWithoutNeck(head, markers, used_cut));

@@ -54,7 +54,7 @@ struct BoneParts {
 // 3 mm off it.
 absl::StatusOr<BoneParts> SeparateBoneParts(const HeadSegmentation& head,
                                             const std::optional<Plane>& given_cut = std::nullopt,
-                                            const StageFunction& tell = nullptr);
+                                            const StageFunction& on_stage = nullptr);
 
 // Whether the image holds the lower jaw but for 3 mm, by BoneParts::cut_off_mm. Errors:
 // InvalidArgument when the image's lower border has cut off more.

@@ -7,8 +7,8 @@
 
 namespace tissueform {
 
-void TellStage(const StageFunction& tell, absl::string_view stage, double fraction) {
-  if (tell) tell(stage, fraction);
+void ReportStage(const StageFunction& on_stage, absl::string_view stage, double fraction) {
+  if (on_stage) on_stage(stage, fraction);
 }
 
 VoxelBox BoundingBox(const LabelGrid& labels) {

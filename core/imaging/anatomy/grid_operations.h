@@ -15,11 +15,11 @@
 
 namespace tissueform {
 
-// Told at the start of each stage of a longer work, with the share of the whole that is done then.
-// May be null.
+// Called at the start of each stage of a longer work, with the share of the whole that is done
+// then. May be null.
 using StageFunction = std::function<void(absl::string_view stage, double fraction)>;
 
-void TellStage(const StageFunction& tell, absl::string_view stage, double fraction);
+void ReportStage(const StageFunction& on_stage, absl::string_view stage, double fraction);
 
 // A block of voxels of a grid: from `first` to `last`, both within.
 struct VoxelBox {

@@ -142,9 +142,9 @@ void RemoveObjects(const LabelGrid& tissue, HeadSegmentation* result) {
 
 absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                              const HeadSegmentationOptions& options,
-                                             const StageFunction& tell, const LabelGrid& metal,
+                                             const StageFunction& on_stage, const LabelGrid& metal,
                                              const LabelGrid& unscanned) {
-  TellStage(tell, "finding the head", 0);
+  ReportStage(on_stage, "finding the head", 0);
   const auto is_tissue = [&](int16_t hu) { return hu > options.tissue_above_hu; };
   const LabelGrid tissue = MaskWhere(ct, is_tissue);
   const ThickPart thick = ThickPartOf(tissue, options.opening_radius_mm);
@@ -170,13 +170,13 @@ absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
   result.cut =
       CutVoxels(result.head, unscanned.values.empty() ? LabelGrid() : Crop(unscanned, box));
 
-  TellStage(tell, "finding bone", 0.6);
+  ReportStage(on_stage, "finding bone", 0.6);
   const LabelGrid dense =
       MaskWhere(result.hu, [&](int16_t hu) { return hu > options.bone_above_hu; });
   result.bone = WithoutSpecks(dense, options.smallest_bone_mm3);
   result.streaks_mm3 = RemoveStreaks(&result);
   TF_RETURN_IF_ERROR(CheckBone(result.bone, options.bone_above_hu));
-  TellStage(tell, "checking for skin", 0.8);
+  ReportStage(on_stage, "checking for skin", 0.8);
   result.bare_fraction = BareFraction(result.head, result.bone, result.cut);
   TF_RETURN_IF_ERROR(CheckSkin(result.bare_fraction));
   return result;

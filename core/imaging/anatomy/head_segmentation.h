@@ -56,7 +56,7 @@ struct HeadSegmentation {
 // tissue covers the bone (a skull, a phantom).
 absl::StatusOr<HeadSegmentation> SegmentHead(const HuGrid& ct,
                                              const HeadSegmentationOptions& options = {},
-                                             const StageFunction& tell = nullptr,
+                                             const StageFunction& on_stage = nullptr,
                                              const LabelGrid& metal = {},
                                              const LabelGrid& unscanned = {});
 

@@ -74,8 +74,8 @@ constexpr double kReliefHalfWidthMm = kMouthHalfWidthCapMm + 5;
 constexpr double kReliefFrontMm = 40;
 constexpr double kReliefDepthMm = 90;
 
-// Untold: one lip ends at a gap, but where the other one begins the relief does not show.
-enum class Seen { kSkin, kGap, kUntold, kNothing };
+// kUnclear: one lip ends at a gap, but the relief does not show where the other one begins.
+enum class Seen { kSkin, kGap, kUnclear, kNothing };
 
 // What a relief shows at a place, as to lips.
 struct Notch {
@@ -129,7 +129,7 @@ class LipColumn {
     const double depth_mm = BelowChord(row);
     // False for infinities, too.
     const bool is_skin = column_seen_ == Seen::kSkin && depth_mm < kInMouthMm;
-    return is_skin ? Notch{Seen::kSkin, depth_mm} : Notch{Seen::kUntold, 0};
+    return is_skin ? Notch{Seen::kSkin, depth_mm} : Notch{Seen::kUnclear, 0};
   }
   // What a path is worth that goes through a row.
   double GainAt(Index row) const {
@@ -201,11 +201,11 @@ class LipColumn {
     const Edge lower = SteepestEdge(fallen, static_cast<Index>(upper.row), -1);
     gap_low_ = lower.row;
     gap_high_ = upper.row;
-    const bool is_told = lower.rise_mm >= kLipEdgeMm;
-    const bool is_closed = is_told ? gap_high_ - gap_low_ < kNarrowestGapMm / relief_.row_mm
-                                   : IsClosedBelow(static_cast<Index>(upper.row));
+    const bool is_clear = lower.rise_mm >= kLipEdgeMm;
+    const bool is_closed = is_clear ? gap_high_ - gap_low_ < kNarrowestGapMm / relief_.row_mm
+                                    : IsClosedBelow(static_cast<Index>(upper.row));
     if (is_closed) return;
-    column_seen_ = is_told ? Seen::kGap : Seen::kUntold;
+    column_seen_ = is_clear ? Seen::kGap : Seen::kUnclear;
   }
   // Whether the notch under an upper lip's edge is that of lips that touch, as where the upper one
   // overhangs: it is not deep, and under it the skin comes forward again.
@@ -355,7 +355,7 @@ struct CornerFound {
 bool EndsClearly(const HalfLine& half, HalfLine::const_iterator end) {
   const HalfPoint& corner = *std::prev(end);
   const bool is_hidden = std::any_of(half.begin(), half.end(), [&](const HalfPoint& point) {
-    return point.seen == Seen::kUntold && std::abs(point.out_mm - corner.out_mm) < kHalfTubeMm;
+    return point.seen == Seen::kUnclear && std::abs(point.out_mm - corner.out_mm) < kHalfTubeMm;
   });
   const auto deep = std::count_if(
       half.begin(), end, [](const HalfPoint& point) { return point.notch_mm >= kShallowNotchMm; });

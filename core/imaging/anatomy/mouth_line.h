@@ -18,7 +18,7 @@ namespace tissueform {
 
 // Limits of an adult mouth, in mm. `left` and `up` are face coordinates (FaceAxes).
 inline constexpr double kMouthLineSearchMm = 9;  // above and below the start
-inline constexpr double kShallowNotchMm = 1.5;   // less is not told from folds of the skin
+inline constexpr double kShallowNotchMm = 1.5;   // less is not distinguished from folds of the skin
 inline constexpr double kMouthHalfWidthCapMm = 30;
 
 // What the height is measured from at which the search begins.

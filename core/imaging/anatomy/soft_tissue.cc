@@ -237,21 +237,24 @@ RegionOfInterest DefaultRegion(const Landmarks& landmarks, const GridGeometry& g
   return region;
 }
 
-absl::StatusOr<SoftTissue> ExtractSoftTissue(
-    const HeadSegmentation& head, const LabelGrid& bone_labels, const Landmarks& landmarks,
-    const RegionOfInterest& region, const SoftTissueOptions& options, const StageFunction& tell) {
-  TellStage(tell, "separating soft tissue from the brain", 0);
+absl::StatusOr<SoftTissue> ExtractSoftTissue(const HeadSegmentation& head,
+                                             const LabelGrid& bone_labels,
+                                             const Landmarks& landmarks,
+                                             const RegionOfInterest& region,
+                                             const SoftTissueOptions& options,
+                                             const StageFunction& on_stage) {
+  ReportStage(on_stage, "separating soft tissue from the brain", 0);
   const std::vector<Plane> planes = region.planes();
   const LabelGrid soft = SoftVoxels(head.head, bone_labels);
   Eigen::Vector3d joint = (landmarks.condyle.left + landmarks.condyle.right) / 2;
   joint.z() = std::max(landmarks.condyle.left.z(), landmarks.condyle.right.z());
   const LabelGrid face = WithoutBrain(soft, options.narrowest_neck_mm, joint);
 
-  TellStage(tell, "finding the outer skin", 0.45);
+  ReportStage(on_stage, "finding the outer skin", 0.45);
   LabelGrid outside_air = OutsideAir(head);
   const LabelGrid shell = SkinShell(head, outside_air, landmarks, options.thinnest_mm);
 
-  TellStage(tell, "cutting the region of interest", 0.6);
+  ReportStage(on_stage, "cutting the region of interest", 0.6);
   const LabelGrid region_soft = Inside(face, planes);
   TF_RETURN_IF_ERROR(CheckVolume(VolumeMm3(region_soft)));
   const LabelGrid region_shell = Inside(shell, planes);
@@ -263,7 +266,7 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(
   LabelGrid mask = LargestComponent(thick, Neighbours::kFaces);
   FillSmallCavities(options.smallest_cavity_mm3, &mask);
 
-  TellStage(tell, "finding its surface", 0.8);
+  ReportStage(on_stage, "finding its surface", 0.8);
   SoftTissue result;
   result.region = region;
   result.volume_mm3 = VolumeMm3(mask);

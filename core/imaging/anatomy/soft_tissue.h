@@ -72,6 +72,6 @@ absl::StatusOr<SoftTissue> ExtractSoftTissue(const HeadSegmentation& head,
                                              const Landmarks& landmarks,
                                              const RegionOfInterest& region,
                                              const SoftTissueOptions& options = {},
-                                             const StageFunction& tell = nullptr);
+                                             const StageFunction& on_stage = nullptr);
 
 }  // namespace tissueform

@@ -11,7 +11,7 @@
 
 namespace tissueform {
 
-// A kind of soft tissue, told by its CT number.
+// A kind of soft tissue, distinguished by its CT number.
 struct TissueClass {
   std::string name;
   double hu_below = 0;  // its CT numbers end here; they begin where those of the class before end

@@ -47,7 +47,7 @@ absl::Status CheckGrid(const VoxelGrid<float>& grid, float level) {
 // A value on the level itself, or nearly, puts a vertex of marching cubes on a corner of its cube:
 // triangles without area, and walls that touch. Kept off by this, no triangle collapses, and the
 // surface moves by less than that part of a voxel.
-// Wide enough for single precision to tell the level from what is beside it.
+// Wide enough for single precision to distinguish the level from its neighbors.
 float Clearance(const VoxelGrid<float>& grid, const SurfaceExtractionOptions& options) {
   float largest = 0;
   for (const float value : grid.values) {

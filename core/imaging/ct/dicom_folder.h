@@ -31,7 +31,7 @@ enum class FoldersBelow {
 };
 
 // Reads the headers of a folder's files. Symbolic links to folders are not followed. A DICOMDIR
-// only tells which files are missing: the headers of the files decide, as the DICOMDIR may be
+// only shows which files are missing: the headers of the files decide, as the DICOMDIR may be
 // outdated. In a helper program only. Internal to core/imaging/ct.
 //
 // Errors: InvalidArgument for a folder without files; ResourceExhausted beyond the limits.

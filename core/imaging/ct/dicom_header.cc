@@ -122,7 +122,7 @@ void ReadValuesAndKind(const gdcm::DataSet& data, DicomHeader* header) {
   header->was_lossy = TextOf(data, kLossyImageCompression) == "01";
 }
 
-// What tells patients, scans and reconstructions apart.
+// What distinguishes patients, scans and reconstructions.
 void ReadOrigin(const gdcm::DataSet& data, DicomHeader* header) {
   header->series_uid = TextOf(data, kSeriesUid);
   header->study_uid = TextOf(data, kStudyUid);

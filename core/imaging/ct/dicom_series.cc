@@ -94,7 +94,7 @@ std::string HeightsOf(const std::vector<DicomHeader>& slices) {
 
 std::string DescribeScan(const Acquisition& scan) {
   return absl::StrCat(scan.slices.size(), scan.slices.size() > 1 ? " slices" : " slice",
-                      " of another scan lying among the others (told apart by ", scan.told_by,
+                      " of another scan lying among the others (told apart by ", scan.separated_by,
                       "): ", FilesOf(scan.slices), ", ", HeightsOf(scan.slices));
 }
 

@@ -16,7 +16,7 @@
 namespace tissueform {
 namespace {
 
-constexpr double kMaxOffPlace = 0.25;  // of the slices, for places alone to tell
+constexpr double kMaxOffPlace = 0.25;  // of the slices, where places alone decide
 constexpr size_t kMaxScans = 8;
 // Interleaved slices of one scan are taken within some seconds.
 constexpr double kLaterS = 60;
@@ -102,7 +102,7 @@ std::vector<double> LargestJumps(const std::vector<DicomHeader>& slices, Time ti
 
 struct Parting {
   std::vector<Stack> scans;
-  std::string told_by;
+  std::string separated_by;
 };
 
 // Parts by one property after the other until the largest scan is as it should be.
@@ -136,21 +136,21 @@ class Separator {
   }
 
  private:
-  void TryText(std::string DicomHeader::*text, const std::string& told_by) {
-    Try(LabelsOf(slices_, [text](const DicomHeader& slice) { return slice.*text; }), told_by);
+  void TryText(std::string DicomHeader::*text, const std::string& separated_by) {
+    Try(LabelsOf(slices_, [text](const DicomHeader& slice) { return slice.*text; }), separated_by);
   }
 
-  void TryTime(Time time, const std::string& told_by) {
+  void TryTime(Time time, const std::string& separated_by) {
     for (const double jump_s : LargestJumps(slices_, time)) {
-      Try(LabelsOfJumps(slices_, time, jump_s), told_by);
+      Try(LabelsOfJumps(slices_, time, jump_s), separated_by);
     }
   }
 
-  void Try(const std::optional<Labels>& labels, const std::string& told_by) {
+  void Try(const std::optional<Labels>& labels, const std::string& separated_by) {
     if (found_ || !labels) return;
     std::vector<Stack> scans = Assemble(stack_, *labels);
     if (scans.size() < 2 || scans.size() > kMaxScans || !IsRegular(scans.front())) return;
-    found_ = Parting{std::move(scans), told_by};
+    found_ = Parting{std::move(scans), separated_by};
   }
 
   // Positions do not distinguish two slices at one place.
@@ -187,7 +187,7 @@ std::vector<Acquisition> SeparateAcquisitions(std::vector<DicomHeader> slices) {
   if (!parting) return {{std::move(slices), ""}};
   std::vector<Acquisition> acquisitions;
   for (const Stack& scan : parting->scans) {
-    Acquisition acquisition{{}, parting->told_by};
+    Acquisition acquisition{{}, parting->separated_by};
     for (const Placed& placed : scan) acquisition.slices.push_back(slices[placed.slice]);
     acquisitions.push_back(std::move(acquisition));
   }

@@ -17,7 +17,7 @@ enum class VolumeFormat { kNifti, kNrrd, kMetaImage };
 // By its ending; nullopt for every other file.
 std::optional<VolumeFormat> VolumeFormatOfPath(const std::string& path);
 
-// What ITK does not tell of a file of NRRD or MetaImage: said in the text at its head.
+// What ITK does not report about a file of NRRD or MetaImage: stated in the text at its head.
 struct VolumeHeader {
   // Of the voxels, beside the header, in their order; empty when they are in the same file.
   std::vector<std::string> data_paths;

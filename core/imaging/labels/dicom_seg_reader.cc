@@ -261,7 +261,7 @@ bool IsDicomFile(const std::string& path) {
 namespace {
 
 // The same file with its data set unpacked, where that is deflated (as dcmqi's files may be). GDCM
-// does not tell where the pixels of such a file begin.
+// does not report where the pixels of such a file begin.
 absl::StatusOr<std::string> WithoutDeflate(std::string contents, int64_t max_bytes) {
   constexpr absl::string_view kGroupLength("\x02\0\0\0UL\4\0", 8);  // (0002,0000), 4 bytes
   constexpr size_t kBegin = 132;

@@ -18,7 +18,7 @@ struct AnswerPose {
   double scale = 1;
 };
 
-// How a pose displaces v, told about a point p: A (v - p) + b with A = scale R - I, row-major.
+// How a pose displaces v, expressed about a point p: A (v - p) + b with A = scale R - I, row-major.
 struct AnswerMotion {
   std::array<double, 9> turn = {};
   std::array<double, 3> move_mm = {};  // b, what the point itself is displaced by

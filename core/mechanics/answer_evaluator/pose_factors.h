@@ -11,8 +11,8 @@
 
 namespace tissueform {
 
-// What columns are multiplied with, and what that tells of the error. REQUIRES: CheckAnswers finds
-// nothing in `answers`; a pose for every handle.
+// What columns are multiplied with, and what that implies for the error. REQUIRES: CheckAnswers
+// finds nothing in `answers`; a pose for every handle.
 struct PoseFactors {
   std::vector<double> factors;  // #factors by 3 (gradient_field) or 1, row-major
   // Of gradient_field what the expansion leaves out, of neo_hookean the estimate with all that is

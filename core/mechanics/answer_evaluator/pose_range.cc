@@ -38,7 +38,7 @@ bool AreLegal(const PortableAnswers& answers, std::span<const AnswerPose> poses)
 bool AreCovered(const PortableAnswers& answers, std::span<const AnswerPose> poses,
                 double error_mm) {
   const AnswerNumbers& numbers = answers.numbers;
-  // Nothing is truncated there: digits alone tell how far poses may go.
+  // Nothing is truncated there: digits alone limit how far poses may go.
   if (IsModel(answers, AnswerModel::kLinearElastic)) return error_mm <= numbers.tolerance_mm;
   const bool is_neo = IsModel(answers, AnswerModel::kNeoHookean);
   const bool in_range = std::all_of(poses.begin(), poses.end(), [&](const AnswerPose& pose) {

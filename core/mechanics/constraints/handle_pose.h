@@ -13,8 +13,8 @@ namespace tissueform {
 // Where a handle goes: x = pivot + scale * exp([rotation_vector]) * (v - pivot) + translation.
 //
 // The rotation vector is axis times angle in radians and goes beyond a turn: 2 pi about x is a full
-// twist, which the deformers tell from no rotation at all. That is why it is neither a quaternion
-// nor a matrix.
+// twist, which the deformers distinguish from no rotation at all. That is why it is neither a
+// quaternion nor a matrix.
 struct HandlePose {
   Eigen::Vector3d rotation_vector = Eigen::Vector3d::Zero();  // radians
   Eigen::Vector3d pivot_mm = Eigen::Vector3d::Zero();

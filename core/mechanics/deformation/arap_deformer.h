@@ -25,9 +25,9 @@ struct ArapOptions {
 // F_t the deformation gradient, R_t its closest rotation, by turns over rotations (closest rotation
 // of every tet) and positions (a Poisson reconstruction with the Laplacian's one factor).
 //
-// E never rises, and summary.energies_nj tells it after every iteration: an accelerated iterate is
-// taken only if its energy is not above the last one, otherwise the plain step, which cannot raise
-// it; when rounding makes even that rise, the last iterate is the answer.
+// E never rises, and summary.energies_nj reports it after every iteration: an accelerated iterate
+// is taken only if its energy is not above the last one, otherwise the plain step, which cannot
+// raise it; when rounding makes even that rise, the last iterate is the answer.
 //
 // Contact rows hold in every step over positions, which then minimises E among the positions that
 // meet them (LaplacianContact), and so in the answer. Closest rotations do not look at them.

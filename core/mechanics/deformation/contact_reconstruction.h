@@ -30,7 +30,7 @@ class ContactReconstruction {
   // `rhs` (#V by 3, or no rows: zero) becomes the right-hand side with the forces of contact.
   absl::StatusOr<Answer> Solve(const HandleTargets& targets, Eigen::MatrixXd* rhs);
 
-  // The contact of displacements under forces, which need not be of one answer: the residual tells
+  // The contact of displacements under forces, which need not be of one answer: the residual shows
   // how well they belong together.
   ContactAnswer Describe(const Eigen::MatrixXd& displacements, const Eigen::VectorXd& forces,
                          const HandleTargets& targets) const;

@@ -60,7 +60,7 @@ struct SolveSummary {
 
 // Of the unilateral contact rows, in the order of the constraint set; empty without any.
 struct ContactAnswer {
-  // Pa mm^2, at least 0. Of gradient_field and arap they tell where contact is, not how strong.
+  // Pa mm^2, at least 0. Of gradient_field and arap they show where contact is, not how strong.
   std::vector<double> forces;
   std::vector<double> gaps_mm;  // at least 0 within the residual
   // How far the answer misses the conditions of contact at most (LcpSolution::kkt_residual_mm).

@@ -21,9 +21,9 @@
 namespace tissueform {
 namespace {
 
-// Power iteration on the matrix and on its inverse. Three steps are enough to tell the condition
-// number to a factor of a few, and a limit for double precision needs no more; each step on the
-// inverse costs a back-substitution.
+// Power iteration on the matrix and on its inverse. Three steps are enough to estimate the
+// condition number to a factor of a few, and a limit for double precision needs no more; each step
+// on the inverse costs a back-substitution.
 constexpr int kConditionIterations = 3;
 
 // The three unknowns of every constrained vertex, rising.
@@ -118,7 +118,7 @@ absl::StatusOr<std::unique_ptr<ElasticSystem>> ElasticSystem::Create(
   // in a scanner's coordinates, a small turn would be the difference of two large columns.
   elastic->origin_ =
       0.5 * (mesh.positions().colwise().minCoeff() + mesh.positions().colwise().maxCoeff());
-  TellProgress(options.observer, PreparationStage::kAssembling);
+  ReportProgress(options.observer, PreparationStage::kAssembling);
   Stopwatch stopwatch;
   {
     const PiecewiseLinearElements elements = ElementsOf(mesh);
@@ -188,14 +188,14 @@ absl::Status ElasticSystem::PrepareResponses(const TetMesh& mesh, const Constrai
   // handles at once would need their right-hand sides beside the columns.
   for (int h = 0; h < handles; ++h) {
     TF_RETURN_IF_ERROR(cancellation.Check());
-    TellProgress(options.observer, PreparationStage::kResponses, int64_t{kColumnsPerHandle} * h,
-                 columns);
+    ReportProgress(options.observer, PreparationStage::kResponses, int64_t{kColumnsPerHandle} * h,
+                   columns);
     TF_ASSIGN_OR_RETURN(
         response_columns_.middleCols(Eigen::Index{kColumnsPerHandle} * h, kColumnsPerHandle),
         Solve({}, AffineMotions(mesh, constraints, h, origin_),
               SlidingMotions(mesh, constraints, sliding_, h, origin_)));
   }
-  TellProgress(options.observer, PreparationStage::kResponses, columns, columns);
+  ReportProgress(options.observer, PreparationStage::kResponses, columns, columns);
   return absl::OkStatus();
 }
 

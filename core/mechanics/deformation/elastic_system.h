@@ -27,7 +27,7 @@ struct ElasticSystemOptions {
   FactorAdmission admission;  // may be empty; called for the factor, then for the response columns
   int threads = 1;
   std::vector<int32_t> node_order = {};    // of the vertices, see DirichletSystem::Options
-  PreparationObserver observer = nullptr;  // may be empty; told of the response columns, too
+  PreparationObserver observer = nullptr;  // may be empty; also receives the response columns
 };
 
 // The stiffness matrix of linear elasticity with the constrained vertices eliminated and

@@ -15,7 +15,7 @@ namespace {
 // Share of the decrease that the slope promises which a step must bring (Armijo).
 constexpr double kSufficientDecrease = 1e-4;
 // Energies closer than this to each other, relative to their size, differ by rounding; the slope
-// then tells whether a step is good (Hager and Zhang 2005).
+// then shows whether a step is good (Hager and Zhang 2005).
 constexpr double kEnergyRounding = 1e-13;
 constexpr double kSlopeDecrease = 0.9;
 constexpr int kMaxTrials = 40;

@@ -32,7 +32,7 @@ absl::StatusOr<std::unique_ptr<PreparedLaplacian>> PrepareLaplacian(
   laplacian->negative_weights = CountNegativeWeights(L);
   TF_ASSIGN_OR_RETURN(laplacian->system,
                       DirichletSystem::Create(L, constraints.constrained(), options, cancellation));
-  TellProgress(options.observer, PreparationStage::kResponses);
+  ReportProgress(options.observer, PreparationStage::kResponses);
   const Stopwatch stopwatch;
   const std::vector<int32_t> guided = GuidedVertices(constraints);
   if (guided.size() == constraints.constrained().size()) {
@@ -101,7 +101,7 @@ MeshPreparation::MeshPreparation(const TetMesh& mesh, Eigen::VectorXd stiffness,
 
 absl::StatusOr<PreparedLaplacian*> MeshPreparation::Laplacian(const Cancellation& cancellation) {
   if (laplacian_ == nullptr) {
-    TellProgress(options_.observer, PreparationStage::kAssembling);
+    ReportProgress(options_.observer, PreparationStage::kAssembling);
     const Stopwatch stopwatch;
     const SparseMatrix L = CotangentLaplacian(mesh_, stiffness_, options_.threads);
     const double assemble_seconds = stopwatch.Seconds();

@@ -38,11 +38,11 @@ struct NeoHookeanOptions {
 // NewtonFallback, and DeformControl::admission for the memory.
 //
 // Where that is no start (it inverts tets, or a handle turns by more than 30 degrees, which may be
-// a full twist that the linear model cannot tell from rest) the poses are approached in load steps,
-// halved where a step would invert a tet. All tets of an answer are positive. Poses that cannot be
-// reached so (a handle pushed through fixed tissue), or not within the iterations, give the state
-// that was: SolveSummary tells its `load`, `residual`, that it has not `converged`, why it
-// `gave_up` and which regions stand in each other's way.
+// a full twist that the linear model cannot distinguish from rest) the poses are approached in load
+// steps, halved where a step would invert a tet. All tets of an answer are positive. Poses that
+// cannot be reached so (a handle pushed through fixed tissue), or not within the iterations, give
+// the state that was: SolveSummary reports its `load`, `residual`, that it has not `converged`, why
+// it `gave_up` and which regions stand in each other's way.
 //
 // Contact rows hold as in TurningContact: the normals of a handle's bone turn with it. The search
 // begins with the rows that touch in the linear answer and keeps them closed; where an equilibrium

@@ -18,7 +18,7 @@ struct ElasticModuli {
 ElasticModuli ModuliOf(double youngs_modulus, double poisson_ratio);
 
 // InvalidArgument unless 0 <= poisson_ratio < 0.5: at one half a material keeps its volume and the
-// displacement alone no longer tells the stress.
+// displacement alone no longer determines the stress.
 absl::Status CheckPoissonRatio(double poisson_ratio);
 
 }  // namespace tissueform

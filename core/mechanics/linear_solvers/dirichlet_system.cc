@@ -117,7 +117,7 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   }
 
   TF_RETURN_IF_ERROR(cancellation.Check());
-  TellProgress(options.observer, PreparationStage::kOrdering);
+  ReportProgress(options.observer, PreparationStage::kOrdering);
   system->cholesky_ = CreateSparseCholesky(
       options.backend,
       {options.unknowns_per_node,
@@ -130,7 +130,7 @@ absl::StatusOr<std::unique_ptr<DirichletSystem>> DirichletSystem::Create(
   if (options.admission) {
     TF_RETURN_IF_ERROR(options.admission(system->factorization_.factor_bytes));
   }
-  TellProgress(options.observer, PreparationStage::kFactorising);
+  ReportProgress(options.observer, PreparationStage::kFactorising);
   stopwatch.Restart();
   TF_RETURN_IF_ERROR(system->cholesky_->Factorize(system->free_free_));
   system->factorization_.factorise_seconds = stopwatch.Restart();

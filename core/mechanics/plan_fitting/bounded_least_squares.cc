@@ -20,9 +20,9 @@ constexpr double kLeastDamping = 1e-12;
 constexpr double kMaxDamping = 1e12;
 
 // Of the steps of differences: shorter ones drown in what residuals are rounded to.
-constexpr double kTellingOfSlopes = 0.1;
-constexpr double kTellingOfCurvature = 0.3;
-// Of the sum: what it cannot tell, because residuals are of single precision.
+constexpr double kEnoughForSlopes = 0.1;
+constexpr double kEnoughForCurvature = 0.3;
+// Of the sum: what it cannot resolve, because residuals are of single precision.
 constexpr double kRounding = 1e-7;
 // Of the sum that the slopes promise: when a step wins less, they are computed again.
 constexpr double kLeastOfPromise = 0.5;
@@ -80,19 +80,19 @@ class Search {
     }
     const bool is_first = slopes_at_.size() == 0;
     curvature_.Take(at_.x, at_.residuals, at_.jacobian,
-                    !is_first && IsTelling(at_.x - slopes_at_, kTellingOfCurvature));
+                    !is_first && IsLongEnough(at_.x - slopes_at_, kEnoughForCurvature));
     slopes_at_ = at_.x;
     slopes_are_taken_ = true;
     Linearise();
   }
 
-  bool IsTelling(const VectorXd& step, double share) const {
+  bool IsLongEnough(const VectorXd& step, double share) const {
     return (step.cwiseAbs().array() > share * problem_.steps.array()).any();
   }
 
-  // What the last step has told of them (Broyden 1965), where it was long enough to.
+  // What the last step has shown about them (Broyden 1965), where it was long enough to.
   void LearnSlopes() {
-    if (IsTelling(last_step_, kTellingOfSlopes)) {
+    if (IsLongEnough(last_step_, kEnoughForSlopes)) {
       at_.jacobian += (last_change_ - at_.jacobian * last_step_) * last_step_.transpose() /
                       last_step_.squaredNorm();
       slopes_are_taken_ = false;

@@ -23,7 +23,8 @@ struct Determination {
   double error_per_mm = 0;
 };
 
-// A combination of free unknowns, from what the targets tell best to what they tell least.
+// A combination of free unknowns, from what the targets determine best to what they determine
+// least.
 struct FitDirection {
   // mm (rms over the targets' numbers, weighted) that change with 1 mm of movement of bone.
   double singular_value = 0;

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// Answers are in single precision, 1e-5 mm on a head: a mm of movement tells slopes to that, and
+// Answers are in single precision, 1e-5 mm on a head: a mm of movement gives slopes to that, and
 // what three orders of half a degree put them off by is as little.
 constexpr double kTranslationStepMm = 0.5;
 // Handles without extent are taken for one of this radius, so that every unknown has a scale.

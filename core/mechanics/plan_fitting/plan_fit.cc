@@ -58,7 +58,7 @@ class Fitting {
       fit.search_seconds += again.Seconds();
     }
     if (options_.full_model == nullptr) positions = PreparedPositions(solution.x);
-    Tell(solution, reached, positions, &fit);
+    Describe(solution, reached, positions, &fit);
     return fit;
   }
 
@@ -101,8 +101,8 @@ class Fitting {
     return solution;
   }
 
-  void Tell(const LeastSquaresSolution& solution, const VectorXd& reached,
-            const Positions& positions, PlanFit* fit) const {
+  void Describe(const LeastSquaresSolution& solution, const VectorXd& reached,
+                const Positions& positions, PlanFit* fit) const {
     fit->poses = unknowns_.PosesOf(solution.x);
     const VectorXd& scales = unknowns_.scales();
     const MatrixXd jacobian = solution.jacobian * scales.asDiagonal();  // by rad and mm

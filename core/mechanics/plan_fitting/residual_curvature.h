@@ -16,15 +16,15 @@ class ResidualCurvature {
   explicit ResidualCurvature(Eigen::Index num_unknowns)
       : matrix_(Eigen::MatrixXd::Zero(num_unknowns, num_unknowns)) {}
 
-  // Slopes were taken at x; `learn`: those before lie far enough from here to tell of bending.
+  // Slopes were taken at x; `learn`: those before lie far enough from here to show bending.
   void Take(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals,
             const Eigen::MatrixXd& jacobian, bool learn);
 
-  // `normal` with the bending, where that is positive definite and foretold the last step better.
+  // `normal` with the bending, where that is positive definite and predicted the last step better.
   Eigen::MatrixXd AddedTo(const Eigen::MatrixXd& normal) const;
 
   // A step lowered |r|^2 + ... by `gain` (negative: raised it), where without bending the slopes
-  // foretold `expected`.
+  // predicted `expected`.
   void Compare(const Eigen::VectorXd& step, double gain, double expected);
 
  private:

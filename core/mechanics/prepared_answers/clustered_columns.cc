@@ -192,7 +192,7 @@ FloatPositions EvaluateClusters(const PortableAnswers& answers, const Eigen::Vec
   const PackedColumns& map = answers.cluster_map;
   AnswerSizes sizes;
   sizes.factors = map.steps.size();
-  sizes.pairs = 1;  // that there are some tells that there are clusters
+  sizes.pairs = 1;  // that there are some shows that there are clusters
   for (size_t k = 1; k < answers.clusters.size(); k += 3) {
     sizes.columns += static_cast<size_t>(answers.clusters[k]);
   }

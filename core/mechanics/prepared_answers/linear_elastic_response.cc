@@ -170,7 +170,7 @@ absl::StatusOr<std::unique_ptr<VertexResponse>> CreateLinearElasticResponse(
   }
   TF_ASSIGN_OR_RETURN(const ElasticSystem* elastic, preparation->Elastic(cancellation));
   // Turned, not solved for: too short to be counted.
-  TellProgress(options.observer, PreparationStage::kAnswers);
+  ReportProgress(options.observer, PreparationStage::kAnswers);
   const Positions& rest = preparation->mesh().positions();
   PortableAnswers answers;
   const std::vector<int32_t> free =

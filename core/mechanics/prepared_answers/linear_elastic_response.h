@@ -29,7 +29,7 @@ struct LinearElasticResponseOptions {
   // May be empty. Called with the bytes that the response needs at most, while it is made and
   // later, before any of them is allocated.
   FactorAdmission admission = nullptr;
-  PreparationObserver observer = nullptr;  // may be empty; told of the columns
+  PreparationObserver observer = nullptr;  // may be empty; receives the columns
 };
 
 // What poses do with the 12 columns a handle. Moves have no range: a sixth of the mesh, which is 3

@@ -25,7 +25,7 @@ struct NeoHookeanResponseOptions {
   // May be empty. Called with the bytes that the response needs at most, while it is made and
   // later, before any of them is allocated.
   FactorAdmission admission = nullptr;
-  PreparationObserver observer = nullptr;  // may be empty; told of the columns
+  PreparationObserver observer = nullptr;  // may be empty; receives the columns
 };
 
 // Bytes that a response of so many vertices needs at most, while it is made.

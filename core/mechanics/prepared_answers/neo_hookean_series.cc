@@ -91,13 +91,13 @@ absl::StatusOr<MatrixXd> SolveAll(const MeshPreparation& preparation, const Elas
       3 * static_cast<Index>(preparation.constraints().constrained().size()), kColumnsPerPass);
   for (Index first = 0; first < forces.cols(); first += kColumnsPerPass) {
     TF_RETURN_IF_ERROR(passes->cancellation.Check());
-    TellProgress(passes->observer, PreparationStage::kAnswers, passes->done, passes->total);
+    ReportProgress(passes->observer, PreparationStage::kAnswers, passes->done, passes->total);
     const Index count = std::min(kColumnsPerPass, forces.cols() - first);
     TF_ASSIGN_OR_RETURN(forces.middleCols(first, count),
                         elastic.Solve(-forces.middleCols(first, count), at_rest.leftCols(count)));
     passes->done += count;
   }
-  TellProgress(passes->observer, PreparationStage::kAnswers, passes->done, passes->total);
+  ReportProgress(passes->observer, PreparationStage::kAnswers, passes->done, passes->total);
   return forces;
 }
 

@@ -48,7 +48,7 @@ struct SeriesSizes {
 // At most, while a series is made, beside its columns.
 int64_t NeoHookeanSeriesBytes(const MeshPreparation& preparation);
 
-// `elastic` is the preparation's own. Tells `observer`, which may be empty, of the columns.
+// `elastic` is the preparation's own. Reports the columns to `observer`, which may be empty.
 // Errors: those of ElasticSystem::Solve; Cancelled.
 absl::StatusOr<NeoHookeanSeries> MakeNeoHookeanSeries(const MeshPreparation& preparation,
                                                       const ElasticSystem& elastic,

@@ -25,7 +25,7 @@ namespace {
 // Polynomials that are solved for in one pass over the factor, and evaluated in one pass over the
 // cells. With three handles 12 take 1.1 times as long, 6 take 1.6 times; more take more memory.
 constexpr Eigen::Index kTermsPerPass = 24;
-// Degrees that are expanded beyond those that are answered with: they tell the truncation error.
+// Degrees that are expanded beyond those that are answered with: they show the truncation error.
 constexpr int kGuardDegrees = 2;
 constexpr int kColumnsPerHandle = 4;
 // Loads, what of them is solved for, its solution and that of all vertices, side by side.
@@ -132,8 +132,8 @@ class ResponseBasisBuilder {
         SimplexPolynomials::NumTerms(polynomials_.dimension(), degree_ + 1);
     return columns_.cols() + 3 * (measured - num_polynomials_);
   }
-  void TellSolved(int64_t columns) const {
-    TellProgress(options_.observer, PreparationStage::kAnswers, columns, NumSolved());
+  void ReportSolved(int64_t columns) const {
+    ReportProgress(options_.observer, PreparationStage::kAnswers, columns, NumSolved());
   }
 
   absl::Status PrepareHandles(const std::vector<int32_t>& free, MeshPreparation* preparation,
@@ -142,7 +142,7 @@ class ResponseBasisBuilder {
     const std::vector<HandleRegion>& handles = preparation->constraints().handles();
     for (size_t h = 0; h < handles.size(); ++h) {
       TF_RETURN_IF_ERROR(cancellation.Check());
-      TellSolved(kColumnsPerHandle * static_cast<int64_t>(h));
+      ReportSolved(kColumnsPerHandle * static_cast<int64_t>(h));
       const Positions& rest = preparation->mesh().positions();
       const Eigen::Vector3d origin = rest(handles[h].vertices, Eigen::all).colwise().mean();
       answers_.origins.insert(answers_.origins.end(), origin.begin(), origin.end());
@@ -165,7 +165,7 @@ class ResponseBasisBuilder {
         SimplexPolynomials::NumTerms(polynomials_.dimension(), degree_ + 1);
     double& largest_gain = answers_.numbers.largest_gain_mm;
     for (Eigen::Index first = 0; first < measured; first += kTermsPerPass) {
-      TellSolved(NumSolved() - 3 * (measured - first));
+      ReportSolved(NumSolved() - 3 * (measured - first));
       TF_RETURN_IF_ERROR(cancellation.Check());
       const Eigen::Index count = std::min(kTermsPerPass, measured - first);
       TF_ASSIGN_OR_RETURN(const Eigen::MatrixXd responses,
@@ -183,7 +183,7 @@ class ResponseBasisBuilder {
         }
       }
     }
-    TellSolved(NumSolved());
+    ReportSolved(NumSolved());
     return absl::OkStatus();
   }
 

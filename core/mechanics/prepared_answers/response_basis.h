@@ -25,7 +25,7 @@ struct ResponseBasisOptions {
   // May be empty. Called with the bytes that the basis needs at most, while it is made and later,
   // before any of them is allocated.
   FactorAdmission admission = nullptr;
-  PreparationObserver observer = nullptr;  // may be empty; told of the columns
+  PreparationObserver observer = nullptr;  // may be empty; receives the columns
 };
 
 // What a basis will be, known from the tolerance and the prepared range before anything is built.

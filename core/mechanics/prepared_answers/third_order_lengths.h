@@ -9,8 +9,8 @@
 
 namespace tissueform {
 
-// What tells by how much a series' third order is believed. With q = |u3| / |u2|, root mean squares
-// over the vertices,
+// What decides by how much a series' third order is believed. With q = |u3| / |u2|, root mean
+// squares over the vertices,
 //   u1 + u2 + u3 / (1 + q) :
 // nearly all of it while the orders fall fast, and where they do not no more than the second moves;
 // the whole of it makes large poses worse. On three heads at their plans' poses the face errs by

@@ -35,7 +35,7 @@ struct Registration {
   double all_rms_mm = 0;  // of all points
   double share = 0;       // of the points that were used, in [0, 1]
   // Mean distance of all points, each counted with at most 10 mm, and with 10 mm where it faces
-  // otherwise: what tells a wrong start from a right one.
+  // otherwise: what distinguishes a wrong start from a right one.
   double score_mm = 0;
 };
 

@@ -48,7 +48,7 @@ int AlignShared(Corners* a, Corners* b) {
 
 // Of two triangles that share one vertex. With another point in common they share the way to it
 // from the vertex; further along it one of them ends first, at its edge opposite to the vertex,
-// inside the other. So these two edges tell.
+// inside the other. So these two edges decide.
 bool CrossBeyondVertex(const Corners& a, const Corners& b) {
   return CGAL::do_intersect(TriangleOf(a), Kernel::Segment_3(b[1].point, b[2].point)) ||
          CGAL::do_intersect(TriangleOf(b), Kernel::Segment_3(a[1].point, a[2].point));

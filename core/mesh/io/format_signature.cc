@@ -94,7 +94,7 @@ bool IsNodeLine(absl::string_view text) {
   return IsCount(first) && !IsCount(second) && absl::SimpleAtod(second, &number);
 }
 
-// What the first characters tell; for XML the one of the two that its type says, .vtu by default.
+// What the first characters show; for XML the one of the two that its type says, .vtu by default.
 std::optional<MeshFormat> FormatOfStart(absl::string_view start) {
   if (absl::StartsWith(start, "\xEF\xBB\xBF")) start.remove_prefix(3);
   // Before comments are left out: the first line of a legacy VTK file is a comment to all others.
@@ -134,7 +134,7 @@ bool IsWholeBinaryStl(const Sample& sample, int64_t bytes) {
   return bytes == kBinaryStlHeaderBytes + kBinaryStlTriangleBytes * int64_t{triangles};
 }
 
-// Binary STL has no mark at its start and may even begin with "solid"; its length tells.
+// Binary STL has no mark at its start and may even begin with "solid"; its length decides.
 bool LooksLike(MeshFormat format, const Sample& sample, int64_t bytes) {
   if (format == MeshFormat::kStl && IsWholeBinaryStl(sample, bytes)) return true;
   return FormatOfStart(sample.start) == format;

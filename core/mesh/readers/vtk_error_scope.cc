@@ -35,7 +35,7 @@ class ScopedOutputWindow : public vtkOutputWindow {
 };
 vtkStandardNewMacro(ScopedOutputWindow);
 
-// VTK tells everything twice: to its output window and to its logger, which prints to stderr.
+// VTK reports everything twice: to its output window and to its logger, which prints to stderr.
 void InstallOutputWindowOnce() {
   static const bool installed = [] {
     vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);

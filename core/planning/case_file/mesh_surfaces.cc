@@ -26,7 +26,7 @@ std::vector<int> RegionOfVertex(const TetMesh& mesh, const ConstraintSet& constr
   return region;
 }
 
-// The facets with the vertices that they use, in the order of these; `from` tells which they were.
+// The facets with the vertices that they use, in the order of these; `from` states which they were.
 CaseSurface Compacted(const TetMesh& mesh, const TriangleIndices& facets,
                       std::vector<int32_t>* from) {
   std::vector<int32_t> number(static_cast<size_t>(mesh.num_vertices()), -1);

@@ -68,8 +68,8 @@ class Comparison {
   }
 
  private:
-  void Tell(absl::string_view stage) const {
-    if (options_.tell) options_.tell(stage);
+  void ReportStage(absl::string_view stage) const {
+    if (options_.on_stage) options_.on_stage(stage);
   }
 
   // A finding is an error, or a caution where findings are accepted.
@@ -124,7 +124,7 @@ class Comparison {
   }
 
   absl::StatusOr<HeadRegistration> Register() const {
-    Tell("registering the post-operative scan");
+    ReportStage("registering the post-operative scan");
     if (post_.bone) {
       const auto of_skull = [&](const Vector3d& place) { return HeightOf(place) > -kSkullBelowMm; };
       return RegisterHead(Sample(SurfaceKind::kBone, of_skull), *post_.bone, true);
@@ -136,7 +136,7 @@ class Comparison {
   }
 
   absl::Status FindMovements(const SignedSurface& real, Outcome* outcome) const {
-    Tell("measuring the movement of each segment");
+    ReportStage("measuring the movement of each segment");
     std::optional<TriangleMesh> bone;
     if (post_.bone) bone = Moved(*post_.bone, outcome->registration.to_pre);
     outcome->segments = MeasureSegments(contents_, bone ? &*bone : nullptr);
@@ -188,7 +188,7 @@ class Comparison {
   }
 
   absl::Status Predict(const SignedSurface& real, Outcome* outcome) {
-    Tell("preparing the models");
+    ReportStage("preparing the models");
     PreparationOptions preparing = problem_.deformer.preparation;
     preparing.threads = options_.threads;
     TF_ASSIGN_OR_RETURN(const auto preparation,
@@ -198,7 +198,7 @@ class Comparison {
                             LandmarksOf(contents_));
     std::vector<ComparedPrediction> planned;
     for (const DeformationModel model : options_.models) {
-      Tell(absl::StrCat("predicting with ", TraitsOf(model).name));
+      ReportStage(absl::StrCat("predicting with ", TraitsOf(model).name));
       DeformerOptions of_model = problem_.deformer;
       of_model.model = model;
       TF_ASSIGN_OR_RETURN(const auto deformer, CreateDeformer(preparation, of_model));
@@ -222,7 +222,7 @@ class Comparison {
     const std::vector<ModelSettings> settings = SettingsToTry(problem_);
     SettingsDeformer deformer(problem_, options_.threads);
     for (size_t s = 0; s < settings.size(); ++s) {
-      Tell(absl::StrFormat("predicting with settings %d of %d", s + 1, settings.size()));
+      ReportStage(absl::StrFormat("predicting with settings %d of %d", s + 1, settings.size()));
       TF_ASSIGN_OR_RETURN(const Deformation answer, deformer.Deform(settings[s], InOrder(poses)));
       TF_ASSIGN_OR_RETURN(const PredictedCase predicted,
                           PredictCase(contents_, answer.positions, poses));

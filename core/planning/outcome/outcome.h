@@ -30,7 +30,7 @@ struct OutcomeOptions {
   bool accept_findings = false;
   bool settings = false;  // also Outcome::by_settings
   // Gets what begins. May be empty.
-  std::function<void(absl::string_view stage)> tell = {};
+  std::function<void(absl::string_view stage)> on_stage = {};
 };
 
 // One predicted face against the operated one, in the pre-operative coordinates, LPS, mm.

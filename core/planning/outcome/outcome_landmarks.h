@@ -30,7 +30,7 @@ struct LandmarkComparison {
 
 // The landmarks of a face as docs/measures.md defines them on its profile: nose tip, lips and chin
 // by the foremost skin, subnasale, stomion and sublabiale by the deepest fold between their
-// neighbors. `near` tells about where the first are; names that it does not have are left out.
+// neighbors. `near` states about where the first are; names that it does not have are left out.
 PlacedLandmarks FindOnProfile(const Positions& positions, const TriangleIndices& triangles,
                               const HeadFrame& frame, const PlacedLandmarks& near);
 

@@ -118,7 +118,7 @@ int RunPlanBuildProgram(const PlanBuildWork& work) {
   return RunHelperProgram(
       [&work](const IsolationLimits& limits, PipeReceiver* from, PipeSender* answer) {
         answer->Outcome(absl::OkStatus());
-        const auto tell = [answer](absl::string_view stage, double fraction) {
+        const auto on_stage = [answer](absl::string_view stage, double fraction) {
           answer->Number(kStage);
           answer->Text(stage);
           answer->Number(std::llround(fraction * kFractionUnits));
@@ -127,7 +127,7 @@ int RunPlanBuildProgram(const PlanBuildWork& work) {
         const absl::Status outcome =
             WithoutExceptions("building the plan", limits, [&]() -> absl::Status {
               TF_ASSIGN_OR_RETURN(const PlanBuildRequest request, ReceiveRequest(from));
-              TF_ASSIGN_OR_RETURN(made, work(request, tell));
+              TF_ASSIGN_OR_RETURN(made, work(request, on_stage));
               return absl::OkStatus();
             });
         answer->Number(kOutcome);

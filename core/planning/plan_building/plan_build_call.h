@@ -47,7 +47,8 @@ struct BuildInputFiles {
 };
 
 struct PlanBuildCallOptions {
-  // Told what begins and how much of the whole is done, in [0, 1], rising; on the caller's thread.
+  // Called with what begins and how much of the whole is done, in [0, 1], rising; on the caller's
+  // thread.
   std::function<void(absl::string_view stage, double fraction)> tell;
   // A descriptor (of a pipe, signalfd, eventfd); the call ends when it becomes readable. -1: none.
   int cancel = -1;
@@ -74,7 +75,7 @@ absl::StatusOr<PlanBuildAnswer> CallPlanBuild(const PlanBuildRequest& request,
 // The other side: what the program does with a request.
 using PlanBuildWork = std::function<absl::StatusOr<PlanBuildAnswer>(
     const PlanBuildRequest& request,
-    const std::function<void(absl::string_view stage, double fraction)>& tell)>;
+    const std::function<void(absl::string_view stage, double fraction)>& on_stage)>;
 
 // What main() of the program returns: takes one request from its caller, and answers.
 int RunPlanBuildProgram(const PlanBuildWork& work);

@@ -38,22 +38,22 @@ constexpr double kBandVoxels = 2;
 // A stage of the work and where in it the others begin.
 class Progress {
  public:
-  explicit Progress(const StageFunction& tell) : tell_(tell) {}
+  explicit Progress(const StageFunction& on_stage) : on_stage_(on_stage) {}
 
   void Begin(absl::string_view stage, double from, double to) {
     from_ = from;
     to_ = to;
-    TellStage(tell_, stage, from);
+    ReportStage(on_stage_, stage, from);
   }
   // The function that the parts of a stage report their progress to.
   StageFunction Parts() const {
     return [this](absl::string_view stage, double fraction) {
-      TellStage(tell_, stage, from_ + (to_ - from_) * fraction);
+      ReportStage(on_stage_, stage, from_ + (to_ - from_) * fraction);
     };
   }
 
  private:
-  const StageFunction& tell_;
+  const StageFunction& on_stage_;
   double from_ = 0;
   double to_ = 0;
 };
@@ -193,7 +193,7 @@ absl::StatusOr<Anatomy> FindAnatomy(const ResampledCt& ct, const Recipe& recipe,
   return anatomy;
 }
 
-// Surfaces tell the bones apart: only the landmarks are found.
+// Surfaces separate the bones: only the landmarks are found.
 absl::StatusOr<Anatomy> FindAnatomyOfSurfaces(SurfaceHead made, const Recipe& recipe,
                                               Progress* progress) {
   progress->Begin("finding landmarks", 0.42, 0.46);
@@ -341,7 +341,7 @@ std::vector<double> DissectedMm(const std::vector<RecipeSegment>& segments) {
   return is_any ? dissected_mm : std::vector<double>();
 }
 
-// Gray values tell no tissue: what labels do not name is muscle, as most of a face's depth.
+// Gray values identify no tissue: what labels do not name is muscle, as most of a face's depth.
 LabelGrid TissueWithoutHu(const Anatomy& anatomy, const StiffnessTable& table) {
   constexpr double kMuscleHu = 50;
   LabelGrid tissue(anatomy.head.hu.geometry, static_cast<uint8_t>(TissueOf(table, kMuscleHu)));
@@ -467,7 +467,7 @@ std::vector<std::string> NamesOf(const std::vector<BuiltSegment>& segments) {
 
 absl::StatusOr<PlanLabels> CompareWithLabels(const std::string& ct_path, const Recipe& given,
                                              const PlanBuildOptions& options) {
-  Progress progress(options.tell);
+  Progress progress(options.on_stage);
   SetFilterThreads(options.threads);
   TF_ASSIGN_OR_RETURN(ResampledCt ct, ReadAndResample(ct_path, given, options.threads, &progress));
   const Recipe recipe = WithThresholds(given, ct.values);
@@ -527,7 +527,7 @@ absl::StatusOr<PlanBuild> BuildFromSource(Source source, const Recipe& recipe,
   progress.Begin("extracting surfaces for the viewer", 0.98, 1);
   TF_ASSIGN_OR_RETURN(std::vector<CaseSurface> shown, viewer_surfaces.get());
   soft_tissue.outside_air = {};  // as large as the CT's grid, and not asked for any more
-  TellStage(options.tell, "done", 1);
+  ReportStage(options.on_stage, "done", 1);
   return PlanBuild{.recipe = recipe,
                    .ct = std::move(source.provenance),
                    .surface_roles = std::move(source.surface_roles),
@@ -563,7 +563,7 @@ absl::StatusOr<PlanBuild> BuildFromSource(Source source, const Recipe& recipe,
 
 absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& recipe,
                                     const PlanBuildOptions& options) {
-  Progress progress(options.tell);
+  Progress progress(options.on_stage);
   SetFilterThreads(options.threads);
   Recipe planned = recipe;
   TF_ASSIGN_OR_RETURN(Source source, SourceOfCt(ct_path, &planned, options.threads, &progress));
@@ -572,7 +572,7 @@ absl::StatusOr<PlanBuild> BuildPlan(const std::string& ct_path, const Recipe& re
 
 absl::StatusOr<PlanBuild> BuildPlanFromSurfaces(const std::string& path,
                                                 const PlanBuildOptions& options) {
-  Progress progress(options.tell);
+  Progress progress(options.on_stage);
   SetFilterThreads(options.threads);
   progress.Begin("reading the surfaces", 0, 0.12);
   TF_ASSIGN_OR_RETURN(SurfacesInput input, ReadSurfaces(path, options.threads));

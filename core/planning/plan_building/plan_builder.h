@@ -87,8 +87,8 @@ struct PlanBuild {
 
 struct PlanBuildOptions {
   int threads = 1;  // the plan does not depend on it
-  // Told what begins and how much of the whole is done, in [0, 1], rising.
-  StageFunction tell;
+  // Called with what begins and how much of the whole is done, in [0, 1], rising.
+  StageFunction on_stage;
 };
 
 // From a CT to a planning model, by the recipe.

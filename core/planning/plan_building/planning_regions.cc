@@ -45,7 +45,7 @@ bool IsOnCut(const Eigen::Vector3d& place, const SoftTissue& soft_tissue) {
                      [&](const Plane& plane) { return plane.HeightMm(place) < reach; });
 }
 
-// Labels are 0 for air and for what was left out of the model (brain, thin sheets): the CT tells
+// Labels are 0 for air and for what was left out of the model (brain, thin sheets): the CT shows
 // which. A vertex beside the latter is neither skin nor held.
 bool IsAir(const PlanningCt& ct, const Eigen::Vector3d& place) {
   return Interpolate(ct.hu, place) < ct.tissue_above_hu;

@@ -108,7 +108,7 @@ absl::StatusOr<Recipe> ReadRecipe(const std::string& path);
 absl::StatusOr<Recipe> ParseRecipe(std::string_view json, const std::string& name,
                                    const std::optional<std::string>& folder = std::nullopt);
 
-// The recipe with everything that was left out filled in: what report.json tells.
+// The recipe with everything that was left out filled in: what report.json states.
 std::string RecipeToJson(const Recipe& recipe);
 
 }  // namespace tissueform

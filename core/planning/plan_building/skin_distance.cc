@@ -37,7 +37,7 @@ Positions VertexNormals(const TriangleMesh& surface) {
 }
 
 // Steps from the place along the direction; where between two steps the value crosses the threshold
-// the line between them tells.
+// the line between them decides.
 std::optional<double> CrossingMm(const HuGrid& hu, double threshold_hu,
                                  const Eigen::Vector3d& place, const Eigen::Vector3d& direction) {
   const double step = kStepVoxels * hu.geometry.spacing_mm;

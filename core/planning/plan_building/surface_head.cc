@@ -72,19 +72,19 @@ class HeadMaker {
  public:
   HeadMaker(const HeadSurfaces& surfaces, int threads) : surfaces_(surfaces), threads_(threads) {}
 
-  absl::StatusOr<SurfaceHead> Make(double spacing_mm, const StageFunction& tell) {
-    TellStage(tell, "closing the skin", 0);
+  absl::StatusOr<SurfaceHead> Make(double spacing_mm, const StageFunction& on_stage) {
+    ReportStage(on_stage, "closing the skin", 0);
     const ClosedSkin skin = CloseSkin(surfaces_.skin, &made_.notes);
     const Eigen::AlignedBox3d box = BoxOf(skin.skin);
     TF_RETURN_IF_ERROR(CheckSkinSize(box));
     const GridGeometry geometry = GridAround(box, spacing_mm);
     TF_ASSIGN_OR_RETURN(LabelGrid head,
                         SolidOf(skin.skin, "the skin", geometry, threads_, skin.open));
-    TellStage(tell, "filling bones with voxels", 0.2);
+    ReportStage(on_stage, "filling bones with voxels", 0.2);
     TF_RETURN_IF_ERROR(FindBones(geometry));
     TF_RETURN_IF_ERROR(CheckUpright());
     TF_RETURN_IF_ERROR(CheckBoneInSkin(skin, &head));
-    TellStage(tell, "measuring distances", 0.5);
+    ReportStage(on_stage, "measuring distances", 0.5);
     MakeVoxels(std::move(head), skin);
     return std::move(made_);
   }
@@ -297,8 +297,8 @@ TetStiffness StiffnessByClass(const TetMesh& mesh, const LabelGrid& tissue_class
 }
 
 absl::StatusOr<SurfaceHead> MakeHeadFromSurfaces(const HeadSurfaces& surfaces, double spacing_mm,
-                                                 int threads, const StageFunction& tell) {
-  return HeadMaker(surfaces, threads).Make(spacing_mm, tell);
+                                                 int threads, const StageFunction& on_stage) {
+  return HeadMaker(surfaces, threads).Make(spacing_mm, on_stage);
 }
 
 }  // namespace tissueform

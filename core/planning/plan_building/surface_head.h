@@ -64,6 +64,7 @@ TetStiffness StiffnessByClass(const TetMesh& mesh, const LabelGrid& tissue_class
 // faces inward or encloses nothing, bone outside the skin, bones that overlap, a head that does not
 // stand upright with the face to the front in LPS.
 absl::StatusOr<SurfaceHead> MakeHeadFromSurfaces(const HeadSurfaces& surfaces, double spacing_mm,
-                                                 int threads, const StageFunction& tell = nullptr);
+                                                 int threads,
+                                                 const StageFunction& on_stage = nullptr);
 
 }  // namespace tissueform

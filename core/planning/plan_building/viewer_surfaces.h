@@ -39,7 +39,7 @@ struct ViewerSources {
 // there is no skin.
 absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources& sources);
 
-// Skin and bone of a head whose jaws are not told apart: all that a scan shows. The skin is open
+// Skin and bone of a head whose jaws are not separated: all that a scan shows. The skin is open
 // where the CT ends.
 struct HeadShells {
   TriangleMesh skin;

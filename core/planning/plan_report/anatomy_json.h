@@ -10,7 +10,7 @@
 
 namespace tissueform {
 
-// Keys of report.json (docs/recipe-format.md) that tell what was found in the CT and how it was
+// Keys of report.json (docs/recipe-format.md) that report what was found in the CT and how it was
 // cut, before anything was meshed.
 
 nlohmann::ordered_json HeadJson(const PlanBuild& build);

@@ -16,7 +16,7 @@
 
 namespace tissueform {
 
-// What the report tells of the skin of the CT, or the given one, that the mesh has or lacks.
+// What the report states about the skin of the CT, or the given one, that the mesh has or lacks.
 
 // 99 % of every region and of the whole within the tolerance, no large gap, no hole.
 std::vector<QualityCheck> CheckCoverage(const SkinCoverage& coverage, const InputWords& words = {});

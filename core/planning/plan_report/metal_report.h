@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// What the report tells of metal in the mouth.
+// What the report states about metal in the mouth.
 
 // The key "metal" of report.json (docs/recipe-format.md).
 nlohmann::ordered_json MetalJson(const PlanBuild& build);

@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// What the report tells of things that touched the head and were taken from it.
+// What the report states about things that touched the head and were taken from it.
 
 // No piece that may hold a part of the face lay on the skin of the region of interest: coverage
 // counts only the skin that is left.

@@ -13,7 +13,7 @@
 
 namespace tissueform {
 
-// What the report tells beyond what building the plan has measured.
+// What the report states beyond what building the plan has measured.
 struct PlanMeasures {
   int64_t inverted_tets = 0;  // without a positive volume
   double share_over_3_deg = 0;

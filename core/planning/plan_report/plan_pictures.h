@@ -24,7 +24,7 @@ struct LegendEntry {
 struct ReportPicture {
   std::string file;  // in the folder "pictures"
   std::string title;
-  std::string caption;  // what is seen, for all readers; also told to those who do not see it
+  std::string caption;  // what is seen, for all readers; also its alternative text
   std::vector<LegendEntry> legend = {};
 };
 

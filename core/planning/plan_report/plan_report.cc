@@ -40,10 +40,10 @@ absl::Status WritePlanReport(const PlanBuild& build, const PlanReportOptions& op
   const PlanMeasures measures = MeasurePlan(build);
   std::vector<ReportPicture> pictures;
   if (options.pictures) {
-    TellStage(options.tell, "drawing the pictures", 0);
+    ReportStage(options.on_stage, "drawing the pictures", 0);
     TF_ASSIGN_OR_RETURN(pictures, Draw(build, measures, root / "pictures"));
   }
-  TellStage(options.tell, "writing the report", 0.9);
+  ReportStage(options.on_stage, "writing the report", 0.9);
   const nlohmann::ordered_json report =
       PlanReportJson(build, measures, options.program_version, pictures);
   TF_RETURN_IF_ERROR(WriteFileAtomically((root / "report.json").string(), report.dump(2) + "\n"));

@@ -15,7 +15,7 @@ namespace tissueform {
 struct PlanReportOptions {
   std::string program_version;
   bool pictures = true;  // they need an X display (VirtualDisplay)
-  StageFunction tell;
+  StageFunction on_stage;
 };
 
 // Writes into the folder, which exists:

@@ -15,7 +15,7 @@
 
 namespace tissueform {
 
-// report.json (docs/recipe-format.md tells its keys).
+// report.json (docs/recipe-format.md defines its keys).
 nlohmann::ordered_json PlanReportJson(const PlanBuild& build, const PlanMeasures& measures,
                                       const std::string& program_version,
                                       const std::vector<ReportPicture>& pictures);

@@ -12,7 +12,7 @@ namespace tissueform {
 // Red, green and blue in [0, 1], as a screen takes them (sRGB).
 using Colour = Eigen::Vector3d;
 
-// Told apart in print and by most colour-blind readers.
+// Distinguished in print and by most colour-blind readers.
 inline const Colour kTissueColour{0.93, 0.74, 0.62};
 inline const Colour kBlue{0.00, 0.35, 0.70};
 inline const Colour kOrange{0.84, 0.37, 0.00};

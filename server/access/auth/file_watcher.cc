@@ -83,8 +83,9 @@ FileWatcher::~FileWatcher() {
   if (thread_.joinable()) thread_.join();
 }
 
-void FileWatcher::Add(std::string path, size_t max_bytes, Tell tell) {
-  files_.push_back({.path = std::move(path), .max_bytes = max_bytes, .tell = std::move(tell)});
+void FileWatcher::Add(std::string path, size_t max_bytes, OnChange on_change) {
+  files_.push_back(
+      {.path = std::move(path), .max_bytes = max_bytes, .on_change = std::move(on_change)});
 }
 
 void FileWatcher::Start() {
@@ -107,10 +108,10 @@ void FileWatcher::Look(File* file) {
   if (!stamp.empty() && stamp == file->stamp) return;
   file->stamp = std::move(stamp);
   const absl::StatusOr<std::string> content = ReadBoundedFile(file->path, file->max_bytes);
-  std::string told = content.ok() ? Sha256Bytes(*content) : content.status().ToString();
-  if (told == file->told) return;
-  file->told = std::move(told);
-  file->tell(content);
+  std::string reported = content.ok() ? Sha256Bytes(*content) : content.status().ToString();
+  if (reported == file->reported) return;
+  file->reported = std::move(reported);
+  file->on_change(content);
 }
 
 }  // namespace tissueform

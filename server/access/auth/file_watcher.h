@@ -19,12 +19,13 @@ namespace tissueform {
 // read), InvalidArgument (no regular file, larger than `max_bytes`); without its path.
 absl::StatusOr<std::string> ReadBoundedFile(const std::string& path, size_t max_bytes);
 
-// Looks at small files again and again, on a thread of its own, and tells what has become of them.
+// Looks at small files again and again, on a thread of its own, and reports what has become of
+// them.
 class FileWatcher {
  public:
   // By the watcher's thread: what the file holds now, or why it cannot be read; once at first and
   // then whenever one of the two is new.
-  using Tell = std::function<void(const absl::StatusOr<std::string>& content)>;
+  using OnChange = std::function<void(const absl::StatusOr<std::string>& content)>;
 
   explicit FileWatcher(std::chrono::milliseconds period) : period_(period) {}
   ~FileWatcher();
@@ -32,16 +33,16 @@ class FileWatcher {
   FileWatcher& operator=(const FileWatcher&) = delete;
 
   // Before Start.
-  void Add(std::string path, size_t max_bytes, Tell tell);
+  void Add(std::string path, size_t max_bytes, OnChange on_change);
   void Start();
 
  private:
   struct File {
     std::string path;
     size_t max_bytes = 0;
-    Tell tell;
-    std::string stamp = {};  // by which it is seen that it has changed
-    std::string told = {};   // digest of the content, or the error; empty: nothing yet
+    OnChange on_change;
+    std::string stamp = {};     // by which it is seen that it has changed
+    std::string reported = {};  // digest of the content, or the error; empty: nothing yet
   };
 
   void Run();

@@ -79,11 +79,11 @@ bool TokenAuthenticator::TakeKeys(const char* option, const absl::StatusOr<std::
 
 absl::StatusOr<Authenticated> TokenAuthenticator::Authenticate(const Credentials& credentials) {
   absl::StatusOr<Authenticated> known = Identify(credentials);
-  if (!known.ok()) Tell(known.status());
+  if (!known.ok()) RecordRefusal(known.status());
   return known;
 }
 
-void TokenAuthenticator::Tell(const absl::Status& refusal) {
+void TokenAuthenticator::RecordRefusal(const absl::Status& refusal) {
   failures_.Count(refusal);
   MutexLock lock(log_mutex_);
   const auto now = std::chrono::steady_clock::now();
@@ -143,7 +143,7 @@ absl::Status TokenAuthenticator::Check(const Authenticated& authenticated) const
 
 absl::Status TokenAuthenticator::IsStillAuthorized(const Authenticated& authenticated) {
   absl::Status good = Check(authenticated);
-  if (!good.ok()) Tell(good);
+  if (!good.ok()) RecordRefusal(good);
   return good;
 }
 

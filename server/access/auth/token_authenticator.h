@@ -60,7 +60,7 @@ class TokenAuthenticator : public Authenticator {
   absl::StatusOr<Authenticated> Verify(absl::string_view token);
   absl::Status Check(const Authenticated& authenticated) const;
   // Counts it, and logs one a second: who floods the server shall not flood its log.
-  void Tell(const absl::Status& refusal) ABSL_LOCKS_EXCLUDED(log_mutex_);
+  void RecordRefusal(const absl::Status& refusal) ABSL_LOCKS_EXCLUDED(log_mutex_);
 
   // Constant.
   const TokenOptions options_;

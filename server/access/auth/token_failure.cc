@@ -66,10 +66,10 @@ absl::string_view TokenFailureName(TokenFailure failure) {
 absl::Status RefuseToken(TokenFailure failure) { return RefuseToken(failure, ""); }
 
 absl::Status RefuseToken(TokenFailure failure, absl::string_view facts) {
-  const Failure& told = kFailures[static_cast<size_t>(failure)];
+  const Failure& known = kFailures[static_cast<size_t>(failure)];
   return WithReason(
-      absl::UnauthenticatedError(absl::StrCat(facts, facts.empty() ? "" : "; ", told.message)),
-      ErrorReason::kUnauthenticated, {{kFact, std::string(told.name)}});
+      absl::UnauthenticatedError(absl::StrCat(facts, facts.empty() ? "" : "; ", known.message)),
+      ErrorReason::kUnauthenticated, {{kFact, std::string(known.name)}});
 }
 
 std::string QuoteForCaller(absl::string_view text) {

@@ -37,7 +37,7 @@ enum class TokenFailure {
   kRevoked,
 };
 
-// As it is counted and told: "unknown_key". Names never change their meaning.
+// As metrics and errors name it: "unknown_key". Names never change their meaning.
 absl::string_view TokenFailureName(TokenFailure failure);
 
 // Unauthenticated, with a sentence that says what to do and holds nothing of the token; the

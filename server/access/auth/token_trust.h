@@ -32,7 +32,8 @@ struct TokenStanding {
 // old ones stay, and the standing has an alarm, which the caller logs. Thread-safe.
 class TokenTrust {
  public:
-  // Of a file or a URL, or why it told nothing. `option` names where from: "--token-keys".
+  // `content`: of a file or a URL, or the error of reading it. `option` names the source:
+  // "--token-keys".
   //
   // Errors: InvalidArgument (nonsense), or the one of `content`; both name the option.
   absl::Status TakeKeys(const char* option, const absl::StatusOr<std::string>& content);

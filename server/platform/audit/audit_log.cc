@@ -68,7 +68,7 @@ void AuditLog::WriteIfRoom(std::string message) {
     MutexLock lock(mutex_);
     if (waiting_.size() + reserved_ >= options_.max_waiting) {
       ++counts_.lost;
-      ++untold_lost_;
+      ++unreported_lost_;
       return;
     }
     waiting_.push_back(std::move(message));
@@ -114,8 +114,8 @@ std::deque<std::string> AuditLog::TakeBatch() {
   std::deque<std::string> batch(std::make_move_iterator(waiting_.begin()),
                                 std::make_move_iterator(end));
   waiting_.erase(waiting_.begin(), end);
-  if (untold_lost_ > 0 && options_.lost_message != nullptr) {
-    batch.push_front(options_.lost_message(std::exchange(untold_lost_, 0)));
+  if (unreported_lost_ > 0 && options_.lost_message != nullptr) {
+    batch.push_front(options_.lost_message(std::exchange(unreported_lost_, 0)));
   }
   return batch;
 }

@@ -75,7 +75,7 @@ class AuditLog {
   ConditionVariable changed_;
   std::deque<std::string> waiting_ ABSL_GUARDED_BY(mutex_);
   size_t reserved_ ABSL_GUARDED_BY(mutex_) = 0;
-  int64_t untold_lost_ ABSL_GUARDED_BY(mutex_) = 0;
+  int64_t unreported_lost_ ABSL_GUARDED_BY(mutex_) = 0;
   Counts counts_ ABSL_GUARDED_BY(mutex_);
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;
 

@@ -61,7 +61,7 @@ void CollectorSink::Work() {
   for (bool is_last = false; !is_last;) {
     is_last = IsEnding();
     const absl::Status status = Deliver();
-    TellChange(status);
+    LogChange(status);
     if (!status.ok()) Disconnect();
     if (is_last) break;
     if (status.ok()) {
@@ -128,7 +128,7 @@ void CollectorSink::Disconnect() {
   settling_ = 0;
 }
 
-void CollectorSink::TellChange(const absl::Status& status) {
+void CollectorSink::LogChange(const absl::Status& status) {
   if (status.ok() == !is_failing_) return;
   is_failing_ = !status.ok();
   if (is_failing_) {

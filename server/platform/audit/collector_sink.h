@@ -71,7 +71,7 @@ class CollectorSink final : public AuditSink {
   absl::Status RemoveSettled(Clock::time_point now);
   void Disconnect();
   // One line in the log when it begins to fail, one when it works again.
-  void TellChange(const absl::Status& status);
+  void LogChange(const absl::Status& status);
   // Until there are new messages, what was sent has settled, or the end.
   void WaitForWork() ABSL_LOCKS_EXCLUDED(mutex_);
   void WaitToRetry(std::chrono::milliseconds time) ABSL_LOCKS_EXCLUDED(mutex_);

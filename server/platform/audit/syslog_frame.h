@@ -19,7 +19,7 @@ class SyslogFormat {
  public:
   explicit SyslogFormat(const AuditProgram& program);
 
-  // `number` becomes the sequenceId, which tells duplicates and gaps: from 1, and 1 again after
+  // `number` becomes the sequenceId, which shows duplicates and gaps: from 1, and 1 again after
   // 2147483647. `text` is printable ASCII.
   std::string Frame(int64_t number, absl::Time time, absl::string_view text) const;
 

@@ -19,12 +19,12 @@ absl::Status NamingPath(absl::Status status, absl::string_view path) {
   return status;
 }
 
-absl::Status TellingClients(absl::Status status, absl::string_view sentence) {
+absl::Status WithClientMessage(absl::Status status, absl::string_view sentence) {
   status.SetPayload(kSentenceUrl, absl::Cord(sentence));
   return status;
 }
 
-bool TellsClientsOtherwise(const absl::Status& status) {
+bool HasClientMessage(const absl::Status& status) {
   return status.GetPayload(kSentenceUrl).has_value();
 }
 

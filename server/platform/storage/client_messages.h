@@ -17,8 +17,8 @@ namespace tissueform {
 absl::Status NamingPath(absl::Status status, absl::string_view path);
 // `status` with one plain sentence for clients; its message is for the log and the operator. OK
 // stays OK.
-absl::Status TellingClients(absl::Status status, absl::string_view sentence);
-bool TellsClientsOtherwise(const absl::Status& status);
+absl::Status WithClientMessage(absl::Status status, absl::string_view sentence);
+bool HasClientMessage(const absl::Status& status);
 // That sentence, or the message of `status` without such a path.
 std::string MessageForClients(const absl::Status& status);
 

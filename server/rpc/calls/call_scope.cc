@@ -214,11 +214,11 @@ void CallScope::SetResource(std::string resource) {
 CallScope::~CallScope() {
   if (gate_ == nullptr) return;
   spdlog::warn("{} ended without an outcome, request {}", method_, request_id_);
-  TellEnd(absl::CancelledError("ended without an outcome"));
+  ReportEnd(absl::CancelledError("ended without an outcome"));
   gate_->Leave();
 }
 
-void CallScope::TellEnd(const absl::Status& outcome) {
+void CallScope::ReportEnd(const absl::Status& outcome) {
   if (std::exchange(counted_, false)) gate_->checks().quotas->End(principal().name, kind_);
   if (gate_->checks().observer == nullptr) return;
   gate_->checks().observer->OnEnd(Observed(), outcome, std::chrono::steady_clock::now() - start_);
@@ -239,7 +239,7 @@ grpc::Status CallScope::End(const absl::Status& outcome) {
                               .traceparent = traceparent_};
   const LogLinesOfCall lines(call);
   spdlog::log(level, "{} {} {:.1f} ms, request {}", method_, code, elapsed.count(), request_id_);
-  TellEnd(outcome);
+  ReportEnd(outcome);
   std::exchange(gate_, nullptr)->Leave();
   return ToGrpcStatus(outcome);
 }

@@ -125,7 +125,7 @@ class CallScope {
 
  private:
   ObservedCall Observed() const;
-  void TellEnd(const absl::Status& outcome);
+  void ReportEnd(const absl::Status& outcome);
   absl::Status Admit(grpc::CallbackServerContext* context);
 
   std::string_view method_;

@@ -117,7 +117,7 @@ void SessionWatches::OnSessionEvent(const std::string& session_id, SessionEvent 
       notice.mutable_restored();
       break;
   }
-  channel->Tell(notice);
+  channel->Notify(notice);
 }
 
 void SessionWatches::NotifyDraining(std::chrono::system_clock::time_point end) {
@@ -126,7 +126,7 @@ void SessionWatches::NotifyDraining(std::chrono::system_clock::time_point end) {
   for (const auto& [session_id, weak] : channels_) {
     const std::shared_ptr<WatchChannel> channel = weak.lock();
     if (channel == nullptr) continue;
-    channel->Tell(notice);
+    channel->Notify(notice);
     channel->EndWithDrags(
         WithReason(absl::UnavailableError("the server is draining, and no drag is open; "
                                           "watch again in a minute"),

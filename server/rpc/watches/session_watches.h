@@ -36,7 +36,7 @@ class CreditedWatcher : public Watcher {
 };
 
 // The channels of a server by their sessions, and the open watches by their names: bounds their
-// number and tells them news.
+// number and notifies them.
 //
 // Thread-safe. Its lock comes before those of channels and watchers.
 class SessionWatches {

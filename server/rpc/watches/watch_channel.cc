@@ -96,14 +96,14 @@ void WatchChannel::RemoveDrag(Dragger* dragger) {
   for (Watcher* watcher : watchers_) watcher->EndWatch(*end_with_drags_);
 }
 
-void WatchChannel::TellDrags() {
+void WatchChannel::NotifyDrags() {
   for (Dragger* dragger : drags_) dragger->FollowersChanged(static_cast<int>(watchers_.size()));
 }
 
 bool WatchChannel::Add(Watcher* watcher) {
   MutexLock lock(watchers_mutex_);
   watchers_.insert(watcher);
-  TellDrags();
+  NotifyDrags();
   if (end_with_drags_.has_value() && drags_.empty()) watcher->EndWatch(*end_with_drags_);
   if (shown_ != nullptr) watcher->Show(shown_);
   MutexLock newest_lock(newest_mutex_);
@@ -115,7 +115,7 @@ bool WatchChannel::Add(Watcher* watcher) {
 void WatchChannel::Remove(Watcher* watcher) {
   MutexLock lock(watchers_mutex_);
   watchers_.erase(watcher);
-  TellDrags();
+  NotifyDrags();
   if (!watchers_.empty()) return;
   // Kept without encoding until there is a watcher again.
   shown_.reset();
@@ -129,9 +129,9 @@ size_t WatchChannel::num_watchers() const {
   return watchers_.size();
 }
 
-void WatchChannel::Tell(const v1::DeformNotice& notice) {
+void WatchChannel::Notify(const v1::DeformNotice& notice) {
   MutexLock lock(watchers_mutex_);
-  for (Watcher* watcher : watchers_) watcher->Tell(notice);
+  for (Watcher* watcher : watchers_) watcher->Notify(notice);
 }
 
 void WatchChannel::EndWatches(const absl::Status& outcome) {

@@ -33,7 +33,7 @@ struct WatchedFrame {
 class Watcher {
  public:
   virtual void Show(const std::shared_ptr<const WatchedFrame>& frame) = 0;
-  virtual void Tell(const v1::DeformNotice& notice) = 0;
+  virtual void Notify(const v1::DeformNotice& notice) = 0;
   virtual void EndWatch(const absl::Status& outcome) = 0;
 
  protected:
@@ -77,7 +77,7 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
   void Remove(Watcher* watcher);
   size_t num_watchers() const;
 
-  void Tell(const v1::DeformNotice& notice);
+  void Notify(const v1::DeformNotice& notice);
   void EndWatches(const absl::Status& outcome);
   // Ends the watches as soon as there are no drags.
   void EndWithDrags(const absl::Status& outcome);
@@ -90,7 +90,7 @@ class WatchChannel : public std::enable_shared_from_this<WatchChannel> {
     std::shared_ptr<const v1::WatchForm> form;
   };
 
-  void TellDrags() ABSL_EXCLUSIVE_LOCKS_REQUIRED(watchers_mutex_);
+  void NotifyDrags() ABSL_EXCLUSIVE_LOCKS_REQUIRED(watchers_mutex_);
   void Put(Newest newest) ABSL_EXCLUSIVE_LOCKS_REQUIRED(newest_mutex_);
   void StartEncoding() ABSL_EXCLUSIVE_LOCKS_REQUIRED(newest_mutex_);
   // On a worker, one at a time.

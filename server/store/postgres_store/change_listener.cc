@@ -22,20 +22,20 @@ constexpr std::chrono::seconds kSilence{3};
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ChangeListener>> ChangeListener::Start(
-    const PostgresOptions& options, Callback told) {
+    const PostgresOptions& options, Callback on_change) {
   TF_ASSIGN_OR_RETURN(PostgresTarget target, TargetOf(options));
   std::unique_ptr<ChangeListener> listener(
-      new ChangeListener(std::move(target), options.unanswered_timeout, std::move(told)));
+      new ChangeListener(std::move(target), options.unanswered_timeout, std::move(on_change)));
   TF_RETURN_IF_ERROR(listener->Connect());
   listener->thread_ = std::thread([raw = listener.get()] { raw->Loop(); });
   return listener;
 }
 
 ChangeListener::ChangeListener(PostgresTarget target, std::chrono::milliseconds unanswered,
-                               Callback told)
+                               Callback on_change)
     : target_(std::move(target)),
       unanswered_(unanswered),
-      told_(std::move(told)),
+      on_change_(std::move(on_change)),
       watch_([this] { Watch(); }) {}
 
 ChangeListener::~ChangeListener() {
@@ -117,10 +117,10 @@ void ChangeListener::Loop() {
     const absl::StatusOr<std::vector<std::string>> notices = Wait();
     if (!notices.ok()) {
       if (!ConnectAgain()) return;
-      told_({.kind = StoreChange::Kind::kMissed});
+      on_change_({.kind = StoreChange::Kind::kMissed});
       continue;
     }
-    for (const std::string& notice : *notices) told_(ParseStoreChange(notice));
+    for (const std::string& notice : *notices) on_change_(ParseStoreChange(notice));
   }
 }
 

@@ -28,14 +28,14 @@ class ChangeListener {
 
   // What is committed after it has returned is reported. Errors: those of PostgresConnection.
   static absl::StatusOr<std::unique_ptr<ChangeListener>> Start(const PostgresOptions& options,
-                                                               Callback told);
-  // Afterwards `told` is no longer called.
+                                                               Callback on_change);
+  // Afterwards `on_change` is no longer called.
   ~ChangeListener();
   ChangeListener(const ChangeListener&) = delete;
   ChangeListener& operator=(const ChangeListener&) = delete;
 
  private:
-  ChangeListener(PostgresTarget target, std::chrono::milliseconds unanswered, Callback told);
+  ChangeListener(PostgresTarget target, std::chrono::milliseconds unanswered, Callback on_change);
 
   // Errors: those of PostgresConnection; then there is no connection.
   absl::Status Connect() ABSL_LOCKS_EXCLUDED(mutex_);
@@ -50,7 +50,7 @@ class ChangeListener {
 
   const PostgresTarget target_;
   const std::chrono::milliseconds unanswered_;
-  const Callback told_;
+  const Callback on_change_;
   Mutex mutex_;
   ConditionVariable changed_;
   bool ending_ ABSL_GUARDED_BY(mutex_) = false;

@@ -45,7 +45,7 @@ absl::StatusOr<LeaseAnswer> LeaseKeeper::Acquire(const std::string& session) {
     TF_RETURN_IF_ERROR(Asked(answer.status()));
     lost = held_.Acquired(session, *answer);
   }
-  TellLost(lost);
+  ReportLost(lost);
   return answer;
 }
 
@@ -98,12 +98,12 @@ absl::StatusOr<std::chrono::milliseconds> LeaseKeeper::Renew() {
       next = std::min(next, options_.again);
     }
   }
-  TellLost(lost);
+  ReportLost(lost);
   TF_RETURN_IF_ERROR(status);
   return next;
 }
 
-void LeaseKeeper::TellLost(const std::vector<SessionLease>& lost) {
+void LeaseKeeper::ReportLost(const std::vector<SessionLease>& lost) {
   for (const SessionLease& lease : lost) lost_(lease);
 }
 

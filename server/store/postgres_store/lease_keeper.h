@@ -75,7 +75,7 @@ class LeaseKeeper {
   absl::Status Silence() ABSL_EXCLUSIVE_LOCKS_REQUIRED(calls_);
   // `answer`, remembered for that.
   absl::Status Asked(absl::Status answer) ABSL_EXCLUSIVE_LOCKS_REQUIRED(calls_);
-  void TellLost(const std::vector<SessionLease>& lost);
+  void ReportLost(const std::vector<SessionLease>& lost);
 
   SessionLeases* const leases_;
   const Options options_;

@@ -30,8 +30,8 @@ std::string FirstLine(absl::string_view text) {
 
 constexpr char kSameRows[] = "concurrent changes; try again";
 
-absl::Status Told(StatusCode code, const std::string& name, absl::string_view what,
-                  absl::string_view sentence = "") {
+absl::Status DatabaseError(StatusCode code, const std::string& name, absl::string_view what,
+                           absl::string_view sentence = "") {
   return HidingDatabase(absl::Status(code, absl::StrCat("database ", name, ": ", what)), sentence);
 }
 
@@ -41,7 +41,7 @@ constexpr char kNoChanges[] = "the server's database is read-only now; try again
 constexpr char kSameRowsUrl[] = "type.tissueform/OthersHoldRows";
 
 absl::Status HeldByOthers(const std::string& name, absl::string_view what) {
-  absl::Status status = Told(StatusCode::kUnavailable, name, what, kSameRows);
+  absl::Status status = DatabaseError(StatusCode::kUnavailable, name, what, kSameRows);
   status.SetPayload(kSameRowsUrl, absl::Cord());
   return status;
 }
@@ -52,7 +52,7 @@ PostgresFailure SameRows(const std::string& name) {
 }
 
 PostgresFailure LostConnection(const std::string& name, const std::exception& error) {
-  return {.status = Told(StatusCode::kUnavailable, name, FirstLine(error.what())),
+  return {.status = DatabaseError(StatusCode::kUnavailable, name, FirstLine(error.what())),
           .transient = true,
           .connected = false};
 }
@@ -61,11 +61,12 @@ PostgresFailure LostConnection(const std::string& name, const std::exception& er
 PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error) {
   const std::string& state = error.sqlstate();
   if (state == "53100") {
-    return {Told(StatusCode::kResourceExhausted, name, "its disk is full; free some space")};
+    return {
+        DatabaseError(StatusCode::kResourceExhausted, name, "its disk is full; free some space")};
   }
   if (state == "25006") {
     // Where a failover has made a replica of what was the primary another connection may find it.
-    return {.status = Told(StatusCode::kUnavailable, name, kReadOnly, kNoChanges),
+    return {.status = DatabaseError(StatusCode::kUnavailable, name, kReadOnly, kNoChanges),
             .transient = true,
             .connected = false};
   }
@@ -77,15 +78,15 @@ PostgresFailure FailureOf(const std::string& name, const pqxx::sql_error& error)
     return {HeldByOthers(name, "the rows are locked for too long; try again")};
   }
   if (state == "57014") {
-    return {Told(StatusCode::kUnavailable, name,
-                 "a statement took too long and was canceled; try again")};
+    return {DatabaseError(StatusCode::kUnavailable, name,
+                          "a statement took too long and was canceled; try again")};
   }
   if (absl::StartsWith(state, "08") || absl::StartsWith(state, "57P") || state == "53300" ||
       state == "25P03") {
     return LostConnection(name, error);
   }
-  return {Told(StatusCode::kInternal, name,
-               absl::StrCat(FirstLine(error.what()), " (SQLSTATE ", state, ")"))};
+  return {DatabaseError(StatusCode::kInternal, name,
+                        absl::StrCat(FirstLine(error.what()), " (SQLSTATE ", state, ")"))};
 }
 
 }  // namespace
@@ -100,7 +101,7 @@ PostgresFailure FailureOfCaught(const std::string& name) {
   } catch (const pqxx::broken_connection& error) {
     return LostConnection(name, error);
   } catch (const std::exception& error) {
-    return {.status = Told(StatusCode::kInternal, name, FirstLine(error.what())),
+    return {.status = DatabaseError(StatusCode::kInternal, name, FirstLine(error.what())),
             .connected = false};
   }
 }
@@ -117,15 +118,16 @@ absl::Status ConnectError(const std::string& name, absl::string_view what) {
       std::all_of(addresses.begin(), addresses.end(), [](absl::string_view address) {
         return absl::StrContains(address, "session is read-only");
       })) {
-    return Told(StatusCode::kFailedPrecondition, name, kReadOnly);
+    return DatabaseError(StatusCode::kFailedPrecondition, name, kReadOnly);
   }
   if (absl::StrContains(what, "password authentication failed") ||
       absl::StrContains(what, "no password supplied")) {
-    return Told(StatusCode::kFailedPrecondition, name,
-                "it refuses the user or the password; correct its address or the password file");
+    return DatabaseError(
+        StatusCode::kFailedPrecondition, name,
+        "it refuses the user or the password; correct its address or the password file");
   }
-  // libpq tells of every address that it has tried; the last words of the first are the reason.
-  return Told(StatusCode::kUnavailable, name, FirstLine(what));
+  // libpq reports every address that it has tried; the last words of the first are the reason.
+  return DatabaseError(StatusCode::kUnavailable, name, FirstLine(what));
 }
 
 }  // namespace tissueform

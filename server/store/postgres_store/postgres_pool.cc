@@ -91,15 +91,15 @@ absl::Status PostgresPool::Run(const Work& work, Clock::time_point deadline,
   const Clock::time_point begin = Clock::now();
   absl::Status status = TryUntil(work, deadline, idempotent);
   latency_.Observe(Clock::now() - begin);
-  if (TellsClientsOtherwise(status)) Tell(status);
+  if (HasClientMessage(status)) LogFailure(status);
   return status;
 }
 
-void PostgresPool::Tell(const absl::Status& failure) {
+void PostgresPool::LogFailure(const absl::Status& failure) {
   {
     MutexLock lock(mutex_);
-    if (Clock::now() < told_ + kBetweenLines) return;
-    told_ = Clock::now();
+    if (Clock::now() < logged_ + kBetweenLines) return;
+    logged_ = Clock::now();
   }
   spdlog::warn("{}", std::string(failure.message()));
 }

@@ -82,7 +82,7 @@ class PostgresPool {
   void Watch();
   // Before another try, after one that began then. False when there is no time for it.
   bool Pause(std::chrono::milliseconds pause, Clock::time_point tried, Clock::time_point deadline);
-  void Tell(const absl::Status& failure);
+  void LogFailure(const absl::Status& failure);
 
   const PostgresOptions options_;
   const PostgresTarget target_;
@@ -99,7 +99,7 @@ class PostgresPool {
   // When a transaction was last committed, and when one failed that another try may help.
   Clock::time_point answered_ ABSL_GUARDED_BY(mutex_);
   Clock::time_point failed_ ABSL_GUARDED_BY(mutex_);
-  Clock::time_point told_ ABSL_GUARDED_BY(mutex_);
+  Clock::time_point logged_ ABSL_GUARDED_BY(mutex_);
 
   std::thread watch_;  // last: it uses the others
 };

@@ -25,8 +25,8 @@ struct StoreChange {
   friend bool operator==(const StoreChange&, const StoreChange&) = default;
 };
 
-// A change as the triggers tell it ("session_deleted ID"). One that is not known, which a newer
-// server may tell, is kMissed.
+// A change as the triggers report it ("session_deleted ID"). One that is not known, which a newer
+// server may report, is kMissed.
 StoreChange ParseStoreChange(const std::string& notice);
 
 }  // namespace tissueform

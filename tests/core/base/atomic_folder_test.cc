@@ -110,7 +110,7 @@ TEST_F(AtomicFolderTest, PublishedFolderHasThePermissionsOfAnyNewFolder) {
   EXPECT_EQ(fs::status(around_ / "goal").permissions(), fs::status(around_ / "any").permissions());
 }
 
-TEST_F(AtomicFolderTest, PlacesThatCannotBeFilledAreToldApart) {
+TEST_F(AtomicFolderTest, ErrorsDistinguishPlacesThatCannotBeFilled) {
   EXPECT_THAT(CheckFillable(Path("goal")), IsOk());
   PutFile(Path("file"));
   EXPECT_THAT(CheckFillable(Path("file")),

@@ -28,7 +28,7 @@ TEST(AttributeTest, ScalarsOfAnyTypeAreFoundAsDoubles) {
   EXPECT_THAT(ToDoubles({"x", 1, std::vector<int64_t>{-1}}), ElementsAre(-1));
 }
 
-TEST(AttributeTest, AMissingArrayIsToldWithThoseThatThereAre) {
+TEST(AttributeTest, TheErrorOfAMissingArrayListsTheExistingOnes) {
   EXPECT_THAT(FindScalars(TwoArrays(), "tissue", "cell"),
               StatusIs(absl::StatusCode::kInvalidArgument,
                        AllOf(HasSubstr("no cell array \"tissue\""), HasSubstr("anatomy, normal"))));

@@ -36,7 +36,7 @@ using Code = absl::StatusCode;
 class Builder {
  public:
   absl::StatusOr<BuiltPlan> operator()(const PlanBuildJob& job) {
-    job.tell("cutting the bone", 0.5);
+    job.on_stage("cutting the bone", 0.5);
     {
       MutexLock lock(mutex_);
       begun_.push_back(job.request.title());
@@ -355,7 +355,7 @@ TEST_F(PlanBuildsTest, NothingIsLostOrBuiltTwiceOverManyEnds) {
   EXPECT_EQ(std::adjacent_find(begun.begin(), begun.end()), begun.end()) << "built twice";
 }
 
-TEST_F(PlanBuildsTest, WhatRanWhenTheServerEndedHasFailed) {
+TEST_F(PlanBuildsTest, ABuildThatRanWhenTheServerEndedHasFailed) {
   const std::string id = Create("first");
   WaitFor(id, v1::PLAN_BUILD_STATE_RUNNING);
   Open();
@@ -449,7 +449,7 @@ TEST_F(DraftsTest, WithoutACaseItGoesWhenItsTimeIsOver) {
   EXPECT_THAT(files_->Find("bridge", FileOf(draft)), StatusIs(Code::kNotFound));
 }
 
-TEST_F(DraftsTest, ItsCasesAreToldForAMonthAfterItsCtHasGone) {
+TEST_F(DraftsTest, ListsItsCasesForAMonthAfterItsCtHasGone) {
   const v1::BuildDraft draft = Draft();
   ASSERT_THAT(drafts_->AddCase(IdOf(draft), "cases/1"), IsOk());
   PassHours(limits_.retention_hours);

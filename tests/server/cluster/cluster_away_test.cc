@@ -122,7 +122,7 @@ class ClusterAwayTest : public ClusterTest {
   std::map<std::string, std::future<absl::Status>> calls_;  // last: they use the others
 };
 
-TEST_F(ClusterAwayTest, WhatIsToBeKeptWaitsForADatabaseThatComesBack) {
+TEST_F(ClusterAwayTest, WritesWaitForADatabaseThatComesBack) {
   Start(seconds(30));
   RawDrag drag(a_, session_);
   ASSERT_TRUE(drag.Send(1, /*commit=*/true));
@@ -140,8 +140,8 @@ TEST_F(ClusterAwayTest, WhatIsToBeKeptWaitsForADatabaseThatComesBack) {
   for (auto& [name, call] : calls_) EXPECT_THAT(call.get(), IsOk()) << name;
 }
 
-// Many more than there are threads: those that wait for one are not told later.
-TEST_F(ClusterAwayTest, OneThatDoesNotComeBackIsToldToAllPlainlyAndWhenTheirTimeIsOver) {
+// Many more than there are threads: those that wait for one do not get their error later.
+TEST_F(ClusterAwayTest, AllWritesReportADatabaseThatStaysAwayBeforeTheirDeadline) {
   Start(seconds(3));
   RawDrag drag(a_, session_);
   ASSERT_TRUE(drag.Send(1, /*commit=*/true));

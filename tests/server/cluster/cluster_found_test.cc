@@ -78,7 +78,7 @@ class ClusterFoundTest : public ClusterTest {
   }
 };
 
-TEST_F(ClusterFoundTest, WhateverOneNodeHasMadeAnotherFindsInTheNextCall) {
+TEST_F(ClusterFoundTest, AnotherNodeFindsNewResourcesInTheNextCall) {
   for (int round = 0; round < 5; ++round) {
     const SentMesh mesh(100 + static_cast<uint32_t>(round));
     v1::UploadMeshResponse sent;
@@ -100,7 +100,7 @@ TEST_F(ClusterFoundTest, WhateverOneNodeHasMadeAnotherFindsInTheNextCall) {
   }
 }
 
-TEST_F(ClusterFoundTest, WhatIsNowhereIsNotLookedForAgainAtOnce) {
+TEST_F(ClusterFoundTest, AMissingSessionIsNotLookedUpAgainAtOnce) {
   const int64_t before = b_.server->cluster()->lookups().lookups();
   for (int i = 0; i < 50; ++i) {
     EXPECT_THAT(FindSession(b_, "sessions/nowhere"), StatusIs(Code::kNotFound));
@@ -123,7 +123,7 @@ TEST_F(ClusterFoundTest, AFollowLinkOpensItsSessionOnEveryNodeAtOnce) {
   EXPECT_THAT(FromGrpcStatus(b_.stubs->sessions->GetSession(context.get(), get, &found)), IsOk());
 }
 
-TEST_F(ClusterFoundTest, WhatIsDeletedOrSharedOnOneNodeIsSoOnTheOthersSoon) {
+TEST_F(ClusterFoundTest, DeletionsAndSharesReachTheOtherNodesSoon) {
   const std::string session = MakeSession(a_, 1);
   const std::string prediction = Predict(a_, session);
   ASSERT_THAT(FindSession(b_, session), IsOk());
@@ -148,7 +148,7 @@ TEST_F(ClusterFoundTest, WhatIsDeletedOrSharedOnOneNodeIsSoOnTheOthersSoon) {
   EXPECT_TRUE(Eventually([&] { return b_.server->sessions().table().CountKnown() == 0; }));
 }
 
-TEST_F(ClusterFoundTest, WhoMissedNoticesLearnsAllThatHasHappened) {
+TEST_F(ClusterFoundTest, ANodeThatMissedNoticesCatchesUp) {
   const std::string session = MakeSession(a_, 1);
   ASSERT_TRUE(Eventually([&] { return b_.server->sessions().table().CountKnown() == 1; }));
   // In one transaction: when b's listener is back the session is long gone.
@@ -159,7 +159,7 @@ TEST_F(ClusterFoundTest, WhoMissedNoticesLearnsAllThatHasHappened) {
   EXPECT_THAT(FindSession(b_, session), StatusIs(Code::kNotFound));
 }
 
-TEST_F(ClusterFoundTest, OfTwoThatChangeAnExportOneIsToldThatItHasChanged) {
+TEST_F(ClusterFoundTest, TheSecondOfTwoChangesOfAnExportIsRefusedAsStale) {
   const std::string prediction = Predict(a_, MakeSession(a_, 1));
   v1::CreateExportRequest wanted;
   wanted.set_prediction(prediction);

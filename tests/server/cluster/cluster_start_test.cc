@@ -144,7 +144,7 @@ TEST_F(ClusterStartTest, ADataFolderIsCarriedOverAndServedByNodes) {
   std::filesystem::remove_all(folder);
 }
 
-TEST_F(ClusterStartTest, NodesOfOneNameAreToldAndHoldSessionsApartAllTheSame) {
+TEST_F(ClusterStartTest, NodesOfOneNameAreReportedAndStillHoldSessionsSeparately) {
   const TestNode other = StartNode(NodeOptions("a"));
   EXPECT_TRUE(Eventually([&] { return other.server->cluster()->node().nodes().IsNameTaken(); }));
   EXPECT_TRUE(Eventually([&] { return a_.server->cluster()->node().nodes().IsNameTaken(); }));
@@ -188,7 +188,7 @@ TEST_F(ClusterStartTest, ANodeSaysItsNameAndRefusesWhatIsMeantForAnother) {
               StatusIs(Code::kUnavailable));
 }
 
-TEST_F(ClusterStartTest, APageOfMetricsTellsOfLeases) {
+TEST_F(ClusterStartTest, TheMetricsPageReportsLeases) {
   ServerOptions options = NodeOptions("c");
   options.telemetry.metrics_port = 0;
   const TestNode node = StartNode(options);

@@ -95,7 +95,7 @@ TEST_F(ExportQueueTest, AnotherBookOfTheStoreKnowsTheSame) {
   EXPECT_EQ(again.id, made.id);
 }
 
-TEST_F(ExportQueueTest, WhatLostItsPredictionWhileNobodyLookedIsGone) {
+TEST_F(ExportQueueTest, OpeningRemovesExportsWhosePredictionsAreGone) {
   ASSERT_THAT(Ask("p"), IsOk());
   ASSERT_THAT(Ask("q"), IsOk());
   Open(/*gone=*/{"p"});
@@ -120,7 +120,7 @@ TEST_F(ExportQueueTest, NothingIsTheresThatWasNotKept) {
   EXPECT_EQ(changes_, 1);
 }
 
-TEST_F(ExportQueueTest, WhatAnotherServerHasChangedIsLearntAndTold) {
+TEST_F(ExportQueueTest, ReloadRowsReportsTheChangesOfAnotherServer) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
   ASSERT_OK_AND_ASSIGN(const ExportRecord stays, Ask("r"));
   ExportRecord changed = made;
@@ -142,7 +142,7 @@ TEST_F(ExportQueueTest, WhatAnotherServerHasChangedIsLearntAndTold) {
   EXPECT_THAT(book_->ExportedOfCase(kCase), ElementsAre("r"));
 }
 
-TEST_F(ExportQueueTest, WhatNobodyHereKnowsIsAskedForOnce) {
+TEST_F(ExportQueueTest, ReadsAnUnknownExportFromTheStoreOnce) {
   int asked = 0;
   book_->set_read_gate([&](const std::string& /*id*/, const std::function<absl::Status()>& read) {
     ++asked;
@@ -161,7 +161,7 @@ TEST_F(ExportQueueTest, WhatNobodyHereKnowsIsAskedForOnce) {
 
 // A watch looks up an export that was withdrawn while it is notified of another. If the look-up
 // asked the store it would wait for itself.
-TEST_F(ExportQueueTest, WhoIsToldOfOneFindsThatAnotherIsGoneWithoutTheStore) {
+TEST_F(ExportQueueTest, TheChangeCallbackFindsAWithdrawalWithoutTheStore) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord gone, Ask("p"));
   book_->set_read_gate(
       [](const std::string& /*id*/, const std::function<absl::Status()>& read) { return read(); });
@@ -173,7 +173,7 @@ TEST_F(ExportQueueTest, WhoIsToldOfOneFindsThatAnotherIsGoneWithoutTheStore) {
   EXPECT_THAT(found, StatusIs(Code::kNotFound));
 }
 
-TEST_F(ExportQueueTest, WhatIsTakenBackOpensNothingWhateverTheDiskSays) {
+TEST_F(ExportQueueTest, AWithdrawnExportOpensNothingEvenIfTheDiskFails) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
   store_.broken = true;
   EXPECT_THAT(book_->Remove(made.id), StatusIs(Code::kResourceExhausted));
@@ -221,7 +221,7 @@ TEST_F(ExportQueueTest, OneOwnersWaitingOnesLeaveRoomForOthers) {
   EXPECT_EQ(book_->Waiting("ann").size(), 2U);
 }
 
-TEST_F(ExportQueueTest, WhatHasNotChangedForLongGoesTheOldestFirst) {
+TEST_F(ExportQueueTest, RemovesTheOldestUnchangedExportsFirst) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord changed, Ask("p"));
   ASSERT_THAT(Ask("q"), IsOk());
   ASSERT_THAT(Ask("r"), IsOk());

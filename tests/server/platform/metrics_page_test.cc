@@ -32,7 +32,7 @@ TEST(MetricsPageTest, EverythingIsReadWhenItIsAskedFor) {
   EXPECT_THAT(page.Text(), HasSubstr("a_gauge{place=\"here\"} 2\n"));
 }
 
-TEST(MetricsPageTest, AFamilyIsToldOnceWithAllItsLabels) {
+TEST(MetricsPageTest, WritesAFamilyOnceWithAllItsLabels) {
   MetricsPage page;
   page.AddCounter("calls_total", "Calls.", {{"rpc", "A"}}, [] { return 1.0; });
   page.AddCounter("others_total", "Others.", {}, [] { return 3.0; });
@@ -43,7 +43,7 @@ TEST(MetricsPageTest, AFamilyIsToldOnceWithAllItsLabels) {
             "# HELP others_total Others.\n# TYPE others_total counter\nothers_total 3\n");
 }
 
-TEST(MetricsPageTest, WhatIsNotThereIsLeftOut) {
+TEST(MetricsPageTest, OmitsGaugesWithoutAValue) {
   MetricsPage page;
   page.AddGauge("unknown", "Nothing.", {}, [] { return std::numeric_limits<double>::quiet_NaN(); });
   EXPECT_EQ(page.Text(), "");

@@ -40,7 +40,7 @@ class SystemdNoticesTest : public ::testing::Test {
   void TearDown() override { close(socket_); }
 
   // The next notice; with MSG_DONTWAIT nothing if there is no notice yet.
-  std::string Told(int flags = 0) const {
+  std::string NextNotice(int flags = 0) const {
     std::array<char, 200> bytes{};
     const ssize_t size = recv(socket_, bytes.data(), bytes.size(), flags);
     return size < 0 ? "" : std::string(bytes.data(), static_cast<size_t>(size));
@@ -50,17 +50,17 @@ class SystemdNoticesTest : public ::testing::Test {
   std::unique_ptr<ScopedEnvironment> variable_;
 };
 
-TEST_F(SystemdNoticesTest, ReadinessAndTheEndAreTold) {
+TEST_F(SystemdNoticesTest, ReportsReadinessAndTheEnd) {
   TellSystemdReady();
-  EXPECT_EQ(Told(), "READY=1");
+  EXPECT_EQ(NextNotice(), "READY=1");
   TellSystemdStopping();
-  EXPECT_EQ(Told(), "STOPPING=1");
+  EXPECT_EQ(NextNotice(), "STOPPING=1");
 }
 
 TEST_F(SystemdNoticesTest, TheWatchdogIsFedByEveryAnswer) {
   const ScopedEnvironment interval("WATCHDOG_USEC", "4000");
   const SystemdWatchdog watchdog([](const std::function<void()>& answered) { answered(); });
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(Told(), "WATCHDOG=1");
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(NextNotice(), "WATCHDOG=1");
 }
 
 TEST_F(SystemdNoticesTest, AProgramThatDoesNotAnswerIsNotSaidToLive) {
@@ -74,13 +74,13 @@ TEST_F(SystemdNoticesTest, AProgramThatDoesNotAnswerIsNotSaidToLive) {
       if (questions == 2) second.set_value();
     });
     const std::function<void()> answer = first.get_future().get();
-    EXPECT_EQ(Told(MSG_DONTWAIT), "");
+    EXPECT_EQ(NextNotice(MSG_DONTWAIT), "");
     answer();
-    EXPECT_EQ(Told(), "WATCHDOG=1");
+    EXPECT_EQ(NextNotice(), "WATCHDOG=1");
     second.get_future().get();
   }
   EXPECT_EQ(questions, 2) << "one question at a time";
-  EXPECT_EQ(Told(MSG_DONTWAIT), "");
+  EXPECT_EQ(NextNotice(MSG_DONTWAIT), "");
 }
 
 TEST_F(SystemdNoticesTest, NobodyIsAskedWhereNobodyWaits) {

@@ -114,7 +114,7 @@ TEST_F(MeshUploadStreamTest, ItSurvivesCancellationAtAnyChunkAndGoesOnThere) {
   }
 }
 
-TEST_F(MeshUploadStreamTest, WhatCameBeforeTheClientLeftIsThere) {
+TEST_F(MeshUploadStreamTest, KeepsThePartThatCameBeforeTheClientLeft) {
   const std::unique_ptr<UploadCall> first = Begin(&mesh_service_);
   first->call.Send(Chunk(0, 1000));
   first->call.CloseSending();
@@ -248,7 +248,7 @@ TEST_F(MeshUploadStreamTest, AClientDoesNotPayForASlowDisk) {
   EXPECT_TRUE(upload->EndsWith(Code::OK)) << upload->message;
 }
 
-TEST_F(MeshUploadStreamTest, ARefusalKeepsThePartAndTellsWhereItEnds) {
+TEST_F(MeshUploadStreamTest, ARefusalKeepsThePartAndReportsWhereItEnds) {
   const std::unique_ptr<UploadCall> first = Begin(&mesh_service_);
   first->call.Send(Chunk(0, 1000));
   first->call.Send(Chunk(1001, 10));
@@ -261,7 +261,7 @@ TEST_F(MeshUploadStreamTest, ARefusalKeepsThePartAndTellsWhereItEnds) {
   EXPECT_EQ(Committed(), 1000);
 }
 
-TEST_F(MeshUploadStreamTest, ADrainingServerTakesNoneButTellsHowFarTheyCame) {
+TEST_F(MeshUploadStreamTest, ADrainingServerRefusesNewUploadsButReportsTheirProgress) {
   const std::unique_ptr<UploadCall> open = Begin(&mesh_service_);
   open->call.Send(Chunk(0, 1000));
   WaitUntilCommitted(1000);

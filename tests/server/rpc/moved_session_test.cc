@@ -68,7 +68,7 @@ class MovedSessionTest : protected SharedStore, public ReactorsTest {
     LetLeasesRunOut();
     EXPECT_THAT(there_.Acquire(IdOf(session)), IsOk());
   }
-  void TellLost() {
+  void ReportLost() {
     for (const std::string& id : here_.Renew()) registry_.Lost(id);
   }
 };
@@ -176,13 +176,13 @@ TEST_F(MovedSessionTest, AStreamDoesNotWaitForACommitThatTheStoreNeverAnswers) {
   EXPECT_TRUE(stream->Receive()->has_frame());
   const SessionStore::StatusCallback answer = shared_store_.WaitForUnanswered();
   LetLeasesRunOut();
-  TellLost();
+  ReportLost();
   EXPECT_TRUE(HasMoved(stream->WaitUntilDone()));
   stream.reset();
   answer(absl::OkStatus());  // finds no stream
 }
 
-TEST_F(MovedSessionTest, AStreamWhoseSessionHadLeftMemoryIsToldWhoHasIt) {
+TEST_F(MovedSessionTest, CallsOfAnEvictedSessionReportWhichNodeHasIt) {
   const std::string session = MakeSession();
   const auto stream = Drag(session);
   clock_.Advance(2 * SessionTable::kInUse);
@@ -217,7 +217,7 @@ TEST_F(MovedSessionTest, AStreamThatWaitsForItsSessionToBeMadeEndsAtOnce) {
   acquired.get_future().wait();
   here_.set_acquired(nullptr);
   TakeOver(session);
-  TellLost();
+  ReportLost();
   EXPECT_TRUE(HasMoved(stream->WaitUntilDone()));
   release.set_value();
 }
@@ -257,7 +257,7 @@ TEST_F(MovedSessionTest, WatchesEndWithTheirDragAndBeginAnewWithTheCommittedPose
     committed = response->notice().has_committed();
   }
   LetLeasesRunOut();
-  TellLost();
+  ReportLost();
   EXPECT_TRUE(HasMoved(stream->WaitUntilDone()));
   while (watch.Receive().has_value()) {
   }
@@ -282,7 +282,7 @@ TEST_F(MovedSessionTest, ASessionIsHeldWhileItIsWatched) {
   watch.WaitUntilDone();
 }
 
-TEST_F(MovedSessionTest, WhatIsHandedOverEndsWithoutAFrameMoreAndIsFree) {
+TEST_F(MovedSessionTest, AHandedOverSessionEndsWithoutAnotherFrameAndIsFree) {
   const std::string session = MakeSession();
   const auto stream = Drag(session);
   WatchCall watch(reactions_.get(), &deform_service_, session);

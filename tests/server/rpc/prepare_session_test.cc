@@ -132,7 +132,7 @@ class PrepareSessionTest : public ReactorsTest {
   int64_t mesh_bytes_ = 0;
 };
 
-TEST_F(PrepareSessionTest, ACreationTellsItsStagesInOrderThenTheSession) {
+TEST_F(PrepareSessionTest, ACreationReportsItsStagesInOrderThenTheSession) {
   const Outcome outcome = Run(Creation());
   EXPECT_TRUE(outcome.status.ok()) << outcome.status.error_message();
   // What comes while a message is written gives way to what is newer.
@@ -145,7 +145,7 @@ TEST_F(PrepareSessionTest, ACreationTellsItsStagesInOrderThenTheSession) {
   EXPECT_EQ(registry_.table().size(), 1);
 }
 
-TEST_F(PrepareSessionTest, WhatIsReadyIsAnsweredAtOnce) {
+TEST_F(PrepareSessionTest, AReadySessionIsAnsweredAtOnce) {
   const std::string session = MakeSession();
   v1::PrepareSessionRequest request;
   request.set_open(session);
@@ -362,7 +362,7 @@ TEST_F(PrepareSessionTest, TwoCallsOfOneRequestBothSeeItAndGetOneSession) {
   EXPECT_EQ(registry_.table().size(), 1);
 }
 
-TEST_F(PrepareSessionTest, ASlowReaderHoldsNothingUpAndIsToldTheNewest) {
+TEST_F(PrepareSessionTest, ASlowReaderDelaysNothingAndReceivesTheNewest) {
   const std::unique_ptr<PrepareCall> call = std::make_unique<PrepareCall>(reactions_.get());
   call->StopReading();
   const v1::PrepareSessionRequest request = Creation();

@@ -34,7 +34,7 @@ inline v1::DeformRequest Configuration(const std::string& session) {
   return request;
 }
 
-// The pose number `sequence`: its z shift tells which one was answered.
+// The pose number `sequence`: its z shift shows which one was answered.
 inline v1::DeformRequest Pose(uint64_t sequence) {
   v1::DeformRequest request;
   request.mutable_pose()->set_sequence(sequence);

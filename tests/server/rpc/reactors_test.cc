@@ -95,7 +95,7 @@ class FrameBandTest : public ReactorsTest {
   MaterialUncertainty ranges_;
 };
 
-TEST_F(FrameBandTest, FramesTellTheBandOfTheirPose) {
+TEST_F(FrameBandTest, FramesContainTheBandOfTheirPose) {
   const v1::DeformRequest request = WithRanges(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
   FakeStream stream(reactions_.get());
   stream.Bind(deform_service_.Deform(nullptr));

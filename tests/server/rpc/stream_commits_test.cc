@@ -65,7 +65,7 @@ TEST_F(StreamCommitsTest, SendsOneAtATimeAndThenTheNewest) {
   EXPECT_THAT(SentPoses(), ElementsAre(1, 3));
 }
 
-TEST_F(StreamCommitsTest, TellsWhyACommitFailed) {
+TEST_F(StreamCommitsTest, ReportsWhyACommitFailed) {
   commits_.Put(7, PosesOf(0));
   commits_.StartNext(nullptr);
   const v1::DeformNotice notice = commits_.Finish(7, absl::AbortedError("other handles"));

@@ -27,56 +27,56 @@ class StreamFollowersTest : public ::testing::Test {
   }
 
   DeadlineTimer timer_;
-  std::vector<int> told_;  // of the timer's thread
+  std::vector<int> reported_;  // of the timer's thread
 };
 
-TEST_F(StreamFollowersTest, TellsEveryOtherNumberOnce) {
-  StreamFollowers followers(&timer_, [this](int count) { told_.push_back(count); });
+TEST_F(StreamFollowersTest, ReportsEveryChangedNumberOnce) {
+  StreamFollowers followers(&timer_, [this](int count) { reported_.push_back(count); });
   for (const int count : {0, 2, 2, 1, 0, 0}) {
     followers.FollowersChanged(count);
     WaitForTimer();
   }
   followers.Stop();
-  EXPECT_THAT(told_, ElementsAre(2, 1, 0));
+  EXPECT_THAT(reported_, ElementsAre(2, 1, 0));
 }
 
-TEST_F(StreamFollowersTest, TellsTheNewestOfWhatChangesWhileItTells) {
-  std::promise<void> telling;
+TEST_F(StreamFollowersTest, ReportsTheNewestNumberThatChangesDuringAReport) {
+  std::promise<void> reporting;
   std::promise<void> go_on;
   StreamFollowers followers(&timer_, [&](int count) {
-    told_.push_back(count);
+    reported_.push_back(count);
     if (count != 1) return;
-    telling.set_value();
+    reporting.set_value();
     go_on.get_future().wait();
   });
   followers.FollowersChanged(1);
-  telling.get_future().wait();
+  reporting.get_future().wait();
   followers.FollowersChanged(2);
   followers.FollowersChanged(3);
   go_on.set_value();
   WaitForTimer();
   followers.Stop();
-  EXPECT_THAT(told_, ElementsAre(1, 3));
+  EXPECT_THAT(reported_, ElementsAre(1, 3));
 }
 
-TEST_F(StreamFollowersTest, StoppingWaitsForWhatIsBeingTold) {
-  std::promise<void> telling;
-  bool has_told = false;
+TEST_F(StreamFollowersTest, StoppingWaitsForAReportUnderWay) {
+  std::promise<void> reporting;
+  bool has_reported = false;
   StreamFollowers followers(&timer_, [&](int /*count*/) {
-    telling.set_value();
+    reporting.set_value();
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    has_told = true;
+    has_reported = true;
   });
   followers.FollowersChanged(1);
-  telling.get_future().wait();
+  reporting.get_future().wait();
   followers.Stop();
-  EXPECT_TRUE(has_told);
+  EXPECT_TRUE(has_reported);
 }
 
-TEST_F(StreamFollowersTest, TellsNothingWhereNobodyCame) {
-  StreamFollowers followers(&timer_, [this](int count) { told_.push_back(count); });
+TEST_F(StreamFollowersTest, ReportsNothingWithoutFollowers) {
+  StreamFollowers followers(&timer_, [this](int count) { reported_.push_back(count); });
   followers.Stop();
-  EXPECT_THAT(told_, IsEmpty());
+  EXPECT_THAT(reported_, IsEmpty());
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ class StreamOpeningTest : public testing::StreamPartsTest {
   StreamOpening opening_;
 };
 
-TEST_F(StreamOpeningTest, BeginsWithItsSessionAndTellsNothing) {
+TEST_F(StreamOpeningTest, BeginsWithItsSessionAndSendsNoNotice) {
   ASSERT_THAT(opening_.TakeRequest(Request(), limits_), IsOk());
   EXPECT_EQ(opening_.request().session_id, "id");
   EXPECT_EQ(opening_.configuration(), nullptr);
@@ -37,7 +37,7 @@ TEST_F(StreamOpeningTest, RefusesARequestThatIsOutOfRange) {
   EXPECT_THAT(opening_.TakeRequest(request, limits_), StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
-TEST_F(StreamOpeningTest, TellsThatTheSessionHasLeftAndIsThereAgain) {
+TEST_F(StreamOpeningTest, ReportsThatTheSessionWasEvictedAndRestored) {
   ASSERT_THAT(opening_.TakeRequest(Request(), limits_), IsOk());
   ASSERT_THAT(opening_.TakeSession(MakeSession()), IsOk());
   EXPECT_TRUE(opening_.Leave()->has_evicted());
@@ -48,7 +48,7 @@ TEST_F(StreamOpeningTest, TellsThatTheSessionHasLeftAndIsThereAgain) {
   EXPECT_FALSE(opening_.Resume().has_value());
 }
 
-TEST_F(StreamOpeningTest, TellsOfAnUpdateOnlyWhenTheNewSessionIsThere) {
+TEST_F(StreamOpeningTest, ReportsAnUpdateOnlyWhenTheNewSessionIsThere) {
   ASSERT_THAT(opening_.TakeRequest(Request(), limits_), IsOk());
   ASSERT_THAT(opening_.TakeSession(MakeSession()), IsOk());
   opening_.configuration()->session->MarkUpdated(/*other_handles=*/false);

@@ -195,7 +195,7 @@ TEST_F(WatchTest, WithoutADragTheFirstFrameIsTheSkinAtRestOrAsItWasCommitted) {
   EXPECT_TRUE(committed->WaitUntilDone().has_value());
 }
 
-TEST_F(WatchTest, WhoComesLateIsShownTheNewestFrame) {
+TEST_F(WatchTest, ALateWatchReceivesTheNewestFrame) {
   const std::string session = MakeSession();
   auto early = Watch(session);
   const std::string early_id = early->Begin(v1::WATCH_ORIGIN_REST);
@@ -256,7 +256,7 @@ TEST_F(WatchTest, ASlowWatchIsSentTheNewestFrameOnlyAndSlowsNobody) {
   EXPECT_TRUE(HasReason(gone, ErrorReason::kWatchNotFound));
 }
 
-TEST_F(WatchTest, AWatchIsToldThatItsSessionLeavesMemoryComesBackAndIsDeleted) {
+TEST_F(WatchTest, AWatchReportsThatItsSessionIsEvictedRestoredAndDeleted) {
   const std::string session = MakeSession();
   auto watch = Watch(session);
   watch->Begin(v1::WATCH_ORIGIN_REST);
@@ -288,7 +288,7 @@ TEST_F(WatchTest, InADrainAWatchEndsWithTheLastDrag) {
   EXPECT_EQ(watch->WaitUntilDone()->error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
-TEST_F(WatchTest, WhatCannotBeWatchedIsRefused) {
+TEST_F(WatchTest, RefusesInvalidWatches) {
   const auto refused = [this](const std::string& session, std::optional<int> max_unacked,
                               grpc::StatusCode code, const char* text) {
     SCOPED_TRACE(text);

@@ -29,9 +29,9 @@ using testing::SharedSessions;
 enum class Action {
   kOpen,
   kRenew,
-  kTell,       // what has run out is reported as lost, without asking the store
-  kCommit,     // of the newest drag
-  kCommitOld,  // of the oldest one, as a server does that was stopped
+  kReportLost,  // what has run out is reported as lost, without asking the store
+  kCommit,      // of the newest drag
+  kCommitOld,   // of the oldest one, as a server does that was stopped
   kUpdate,
   kDelete,
   kMakeAgain,  // under the same name, when it was deleted
@@ -110,7 +110,7 @@ class HeldSessionStepsTest : public ::testing::Test {
       case Action::kRenew:
         for (const std::string& lost : node.ownership.Renew()) node.registry.Lost(lost);
         break;
-      case Action::kTell:
+      case Action::kReportLost:
         for (const std::string& lost : node.ownership.TakeEnded()) node.registry.Lost(lost);
         break;
       case Action::kCommit:

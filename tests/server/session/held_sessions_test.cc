@@ -45,7 +45,7 @@ class HeldSessionsTest : public ::testing::Test {
   Node b_{&shared_, "b"};
 };
 
-TEST_F(HeldSessionsTest, WhoMakesASessionHoldsItAndOthersAreToldWhoDoes) {
+TEST_F(HeldSessionsTest, TheCreatorHoldsASessionAndErrorsOfOthersNameIt) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, a_.Create("s"));
   EXPECT_THAT(session->CheckHeld(), IsOk());
   EXPECT_EQ(session->epoch(), shared_.Find("s")->epoch);
@@ -61,7 +61,7 @@ TEST_F(HeldSessionsTest, WhoMakesASessionHoldsItAndOthersAreToldWhoDoes) {
   EXPECT_EQ(b_.registry.table().CountKnown(), 0) << "nothing of it stays known";
 }
 
-TEST_F(HeldSessionsTest, ASessionThatAnotherServerHasMadeIsFoundWithoutBeingToldOfIt) {
+TEST_F(HeldSessionsTest, FindsASessionOfAnotherServerWithoutANotice) {
   ASSERT_THAT(a_.Create("s"), IsOk());
   EXPECT_EQ(b_.registry.table().CountKnown(), 0);
   shared_.Wait(kPastTheLease);
@@ -87,7 +87,7 @@ TEST_F(HeldSessionsTest, ARequestThatIsRepeatedElsewhereIsTheSameRequest) {
   EXPECT_EQ(b_.registry.table().CountKnown(), 1);
 }
 
-TEST_F(HeldSessionsTest, WhatWasTakenOverIsNeitherAnsweredNorWrittenByWhoHadIt) {
+TEST_F(HeldSessionsTest, ThePreviousHolderNeitherAnswersNorWritesATakenSession) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, a_.Create("s"));
   EXPECT_THAT(a_.Commit(before, 1), IsOk());
   shared_.Wait(kPastTheLease);
@@ -107,7 +107,7 @@ TEST_F(HeldSessionsTest, WhatWasTakenOverIsNeitherAnsweredNorWrittenByWhoHadIt) 
   EXPECT_EQ(shared_.stale_writes(), 0);
 }
 
-TEST_F(HeldSessionsTest, WhoHeldASessionWritesNothingOfTheNextOneOfItsName) {
+TEST_F(HeldSessionsTest, ThePreviousHolderCannotWriteANewSessionOfTheSameName) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, a_.Create("s"));
   shared_.Wait(kPastTheLease);
   ASSERT_THAT(b_.Delete("s"), IsOk());
@@ -119,7 +119,7 @@ TEST_F(HeldSessionsTest, WhoHeldASessionWritesNothingOfTheNextOneOfItsName) {
   EXPECT_EQ(b_.Look("s")->record.last_poses[0].translation_mm.z(), 2);
 }
 
-TEST_F(HeldSessionsTest, WhatIsMadeAnewIsHeldThoughADragOfTheSessionBeforeIsNotOver) {
+TEST_F(HeldSessionsTest, ARecreatedSessionIsHeldDuringADragOfThePreviousOne) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, a_.Create("s"));
   ASSERT_THAT(a_.Delete("s"), IsOk());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> after, a_.Create("s"));
@@ -127,7 +127,7 @@ TEST_F(HeldSessionsTest, WhatIsMadeAnewIsHeldThoughADragOfTheSessionBeforeIsNotO
   EXPECT_THAT(a_.Commit(after, 1), IsOk());
 }
 
-TEST_F(HeldSessionsTest, WhatIsLostLeavesMemoryAndStaysKnown) {
+TEST_F(HeldSessionsTest, ALostSessionLeavesMemoryAndStaysKnown) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, a_.Create("s"));
   const int64_t bytes = a_.reserved_bytes();
   a_.registry.Lost("s");
@@ -145,7 +145,7 @@ TEST_F(HeldSessionsTest, WhatIsLostLeavesMemoryAndStaysKnown) {
   EXPECT_THAT(a_.Open("s"), IsOk()) << "nobody else has taken it";
 }
 
-TEST_F(HeldSessionsTest, WhatWasTakenAnewIsMadeAnew) {
+TEST_F(HeldSessionsTest, AReacquiredSessionIsLoadedAgain) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, a_.Create("s"));
   shared_.Wait(kPastTheLease);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> after, a_.Open("s"));
@@ -170,7 +170,7 @@ TEST_F(HeldSessionsTest, ASessionThatIsLostWhileItIsMadeIsNotGivenOut) {
 }
 
 // As uploads may for half a minute while the database is away.
-TEST_F(HeldSessionsTest, WhoMayNotHaveASessionHearsSoThoughAllWorkersWaitForTheStore) {
+TEST_F(HeldSessionsTest, RefusesAHeldSessionWhileAllWorkersWaitForTheStore) {
   ASSERT_THAT(a_.Create("s"), IsOk());
   const std::promise<void> store = b_.HoldUp(Lane::kStore);
   const absl::Status refused = b_.Open("s").status();
@@ -178,7 +178,7 @@ TEST_F(HeldSessionsTest, WhoMayNotHaveASessionHearsSoThoughAllWorkersWaitForTheS
   EXPECT_EQ(NodeIn(refused), "a");
 }
 
-TEST_F(HeldSessionsTest, WhoWaitsForASessionThatIsLostMeanwhileDoesNotWaitForTheStore) {
+TEST_F(HeldSessionsTest, AWaiterOfALostSessionDoesNotWaitForTheStore) {
   ASSERT_THAT(a_.Create("s"), IsOk());
   ASSERT_EQ(a_.EvictAll(), 1);
   a_.Settle();
@@ -202,7 +202,7 @@ TEST_F(HeldSessionsTest, WhoWaitsForASessionThatIsLostMeanwhileDoesNotWaitForThe
 }
 
 // As when the database comes back: the client may have made it elsewhere, and deleted it again.
-TEST_F(HeldSessionsTest, WhatIsMadeForNobodyIsTakenBackThoughItsLeaseIsNotToBeHad) {
+TEST_F(HeldSessionsTest, RemovesACancelledCreationWithoutItsLease) {
   a_.ownership.set_silent(true);
   a_.ownership.set_acquired([this] { a_.Cancel(); });
   EXPECT_THAT(a_.Create("s"), StatusIs(absl::StatusCode::kCancelled));
@@ -212,7 +212,7 @@ TEST_F(HeldSessionsTest, WhatIsMadeForNobodyIsTakenBackThoughItsLeaseIsNotToBeHa
   EXPECT_THAT(b_.Open("s"), StatusIs(absl::StatusCode::kNotFound));
 }
 
-TEST_F(HeldSessionsTest, WhatIsMadeForNobodyStaysWhereAnotherServerHasTakenIt) {
+TEST_F(HeldSessionsTest, KeepsACancelledCreationThatAnotherServerHasTaken) {
   a_.ownership.set_silent(true);
   a_.ownership.set_acquired([this] {
     EXPECT_THAT(b_.Open("s"), IsOk());
@@ -256,7 +256,7 @@ TEST_F(HeldSessionsTest, AWatchersHoldOutlivesTheSessionInMemory) {
   EXPECT_THAT(b_.Open("s"), IsOk());
 }
 
-TEST_F(HeldSessionsTest, WhatCannotBeMadeIsOthersBeforeAnybodyHearsOfIt) {
+TEST_F(HeldSessionsTest, ReleasesASessionThatCannotBeLoadedBeforeItAnswers) {
   ASSERT_THAT(a_.Create("s"), IsOk());
   shared_.Wait(kPastTheLease);
   // Unknown to b, whose catalog has lost the mesh.
@@ -386,7 +386,7 @@ TEST_F(HeldSessionsTest, ServersThatDoEverythingAtOnceWriteNothingOfOthersAndEnd
   EXPECT_EQ(b_.reserved_bytes(), b_bytes);
 }
 
-TEST_F(HeldSessionsTest, WhatIsGivenBackIsNotTakenFromWhoOpensItMeanwhile) {
+TEST_F(HeldSessionsTest, AReleaseDoesNotTakeASessionFromAConcurrentOpen) {
   ASSERT_THAT(a_.Create("s"), IsOk());
   for (int i = 0; i < 200; ++i) {
     // Given back on one thread while it is asked for on another.

@@ -81,7 +81,7 @@ TEST(MemoryBudgetTest, TheLimitIsInclusive) {
   EXPECT_EQ(budget.reserved_bytes(), 0);
 }
 
-TEST(MemoryBudgetTest, RefusalTellsWhatIsAskedTakenAndAllowed) {
+TEST(MemoryBudgetTest, RefusalStatesRequestedTakenAndAllowedBytes) {
   MemoryBudget budget(10 * kMebibyte);
   ASSERT_OK_AND_ASSIGN(const MemoryReservation taken, budget.Reserve(4 * kMebibyte, "mesh"));
   EXPECT_THAT(budget.Reserve(7 * kMebibyte, "matrix factor"),
@@ -196,7 +196,7 @@ TEST(MemoryBudgetTest, AnOwnerHasAPartOfTheWholeAndTakesNothingFromAnother) {
   EXPECT_EQ(budget.reserved_bytes(), 60);
 }
 
-TEST(MemoryBudgetTest, WhatAnOwnerGivesBackMakesRoomForTheSameOwner) {
+TEST(MemoryBudgetTest, BytesThatAnOwnerReleasesMakeRoomForTheSameOwner) {
   MemoryBudget budget(100);
   MemoryReservation idle;
   budget.set_account_limit(60);

@@ -64,7 +64,7 @@ TEST(ProgressPaceTest, NothingGoesBack) {
 
 // What one listener has heard.
 struct Heard {
-  TellSession Teller() {
+  SessionProgressCallback Callback() {
     return [this](const SessionProgress& progress) { all.push_back(progress); };
   }
   std::vector<SessionStage> Stages() const {
@@ -84,17 +84,17 @@ TEST(ProgressFeedTest, IsHeardByThoseOfTheTopicAndByWhoComesInTheMiddle) {
   Heard other;
   Heard late;
   Heard after;
-  auto follows = feed.Follow(1, early.Teller());
-  const auto follows_other = feed.Follow(2, other.Teller());
+  auto follows = feed.Follow(1, early.Callback());
+  const auto follows_other = feed.Follow(2, other.Callback());
   feed.Begin(1);
-  feed.Tell({SessionStage::kOrdering});
-  const auto follows_late = feed.Follow(1, late.Teller());
+  feed.Report({SessionStage::kOrdering});
+  const auto follows_late = feed.Follow(1, late.Callback());
   EXPECT_THAT(late.Stages(), ElementsAre(SessionStage::kOrdering)) << "at once";
-  feed.Tell({SessionStage::kFactorising});
+  feed.Report({SessionStage::kFactorising});
   follows.reset();
-  feed.Tell({SessionStage::kResponses});
+  feed.Report({SessionStage::kResponses});
   feed.End();
-  const auto follows_after = feed.Follow(1, after.Teller());
+  const auto follows_after = feed.Follow(1, after.Callback());
   EXPECT_THAT(early.Stages(), ElementsAre(SessionStage::kOrdering, SessionStage::kFactorising));
   EXPECT_THAT(late.Stages(), ElementsAre(SessionStage::kOrdering, SessionStage::kFactorising,
                                          SessionStage::kResponses));
@@ -109,11 +109,11 @@ class SessionProgressTest : public ::testing::Test {
 
   ~SessionProgressTest() override { pool_.reset(); }
 
-  std::future<Made> Create(SessionRecord record, const TellSession& tell) {
+  std::future<Made> Create(SessionRecord record, const SessionProgressCallback& on_progress) {
     auto promise = std::make_shared<std::promise<Made>>();
     registry_.loader().Create(
         std::move(record), bar_, std::make_shared<std::atomic<bool>>(),
-        [promise](Made made) { promise->set_value(std::move(made)); }, tell);
+        [promise](Made made) { promise->set_value(std::move(made)); }, on_progress);
     return promise->get_future();
   }
 
@@ -134,9 +134,9 @@ class SessionProgressTest : public ::testing::Test {
       testing::Store(testing::SampleMesh(testing::Bar({2, 2, 3})), &catalog_);
 };
 
-TEST_F(SessionProgressTest, ACreationTellsEveryStage) {
+TEST_F(SessionProgressTest, ACreationReportsEveryStage) {
   Heard heard;
-  ASSERT_THAT(Create(Record(DeformationModel::kLinearElastic), heard.Teller()).get(), IsOk());
+  ASSERT_THAT(Create(Record(DeformationModel::kLinearElastic), heard.Callback()).get(), IsOk());
   EXPECT_THAT(heard.Stages(), ElementsAre(SessionStage::kWaiting, SessionStage::kAssembling,
                                           SessionStage::kOrdering, SessionStage::kFactorising,
                                           SessionStage::kResponses, SessionStage::kKeeping));
@@ -159,8 +159,8 @@ TEST_F(SessionProgressTest, OfOnePreparationAllHearWhoNeedWhatIsMade) {
       third_before = third.Stages();
     }
   });
-  auto two = Create(Record(DeformationModel::kNeoHookean), second.Teller());
-  auto three = Create(Record(DeformationModel::kGradientField), third.Teller());
+  auto two = Create(Record(DeformationModel::kNeoHookean), second.Callback());
+  auto three = Create(Record(DeformationModel::kGradientField), third.Callback());
   go.set_value();
   ASSERT_THAT(one.get(), IsOk());
   ASSERT_THAT(two.get(), IsOk());
@@ -174,14 +174,14 @@ TEST_F(SessionProgressTest, OfOnePreparationAllHearWhoNeedWhatIsMade) {
                                           SessionStage::kResponses, SessionStage::kKeeping));
 }
 
-TEST_F(SessionProgressTest, WhoJoinsARequestIsToldAtOnceHowFarItIs) {
+TEST_F(SessionProgressTest, AJoinedRequestReportsItsProgressAtOnce) {
   SessionRecord record = Record(DeformationModel::kGradientField);
   record.request_id = "id";
   record.request_fingerprint = "print";
   Heard joined;
   std::future<Made> two;
   auto one = Create(record, [&](const SessionProgress& progress) {
-    if (progress.stage == SessionStage::kFactorising) two = Create(record, joined.Teller());
+    if (progress.stage == SessionStage::kFactorising) two = Create(record, joined.Callback());
   });
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, one.get());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> same, two.get());
@@ -190,7 +190,7 @@ TEST_F(SessionProgressTest, WhoJoinsARequestIsToldAtOnceHowFarItIs) {
                                            SessionStage::kKeeping));
 }
 
-TEST_F(SessionProgressTest, UpdatesAndRestoresTellThatTheyRead) {
+TEST_F(SessionProgressTest, UpdatesAndRestoresReportThatTheyRead) {
   SessionRecord record = Record(DeformationModel::kGradientField);
   record.id = "a";
   ASSERT_THAT(Create(record, nullptr).get(), IsOk());
@@ -204,7 +204,7 @@ TEST_F(SessionProgressTest, UpdatesAndRestoresTellThatTheyRead) {
       },
       std::make_shared<std::atomic<bool>>(),
       [&update](const absl::StatusOr<SessionView>& view) { update.set_value(view.status()); },
-      updated.Teller());
+      updated.Callback());
   ASSERT_THAT(update.get_future().get(), IsOk());
   const auto expected = [](std::optional<SessionStage> last) {
     std::vector<SessionStage> stages = {SessionStage::kReadingMesh, SessionStage::kWaiting,
@@ -223,7 +223,7 @@ TEST_F(SessionProgressTest, UpdatesAndRestoresTellThatTheyRead) {
   std::promise<Made> opened;
   registry_.loader().Open(
       "a", std::make_shared<std::atomic<bool>>(),
-      [&opened](Made session) { opened.set_value(std::move(session)); }, restored.Teller());
+      [&opened](Made session) { opened.set_value(std::move(session)); }, restored.Callback());
   ASSERT_THAT(opened.get_future().get(), IsOk());
   EXPECT_EQ(restored.Stages(), expected(std::nullopt));
 }

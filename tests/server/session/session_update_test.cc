@@ -144,7 +144,7 @@ TEST_F(SessionUpdateTest, TheNameStaysAndTheRestIsWhatIsAskedFor) {
   EXPECT_EQ(Record().etag, view.record.etag);
   EXPECT_NE(view.record.etag, before.etag);
   EXPECT_EQ(Record().created_s, before.created_s);
-  // The old one tells its holders to open the session again.
+  // The old one notifies its holders to open the session again.
   EXPECT_TRUE(first_->evicted());
   EXPECT_TRUE(first_->updated());
   EXPECT_FALSE(first_->outdated());
@@ -182,7 +182,7 @@ TEST_F(SessionUpdateTest, OfTwoAtOnceOneIsKept) {
   EXPECT_EQ(Open(), kept->session);
 }
 
-TEST_F(SessionUpdateTest, WhatCannotBeMadeLeavesTheSessionAsItWas) {
+TEST_F(SessionUpdateTest, AFailedUpdateLeavesTheSessionUnchanged) {
   const SessionRecord before = Record();
   const int64_t bytes = budget_.reserved_bytes();
   EXPECT_THAT(Update("", [](SessionRecord* record) { record->stiffness = -1.0; }).get(),
@@ -262,7 +262,7 @@ TEST_F(SessionUpdateTest, OtherHandlesBeginAtRestAndTakeNoPosesOfTheOldOnes) {
   EXPECT_THAT(Commit(Open(), Moved(9)), IsOk());
 }
 
-TEST_F(SessionUpdateTest, WhoHoldsAnEvictedOneLearnsOfTheUpdate) {
+TEST_F(SessionUpdateTest, HoldersOfAnEvictedSessionLearnOfTheUpdate) {
   clock_.Advance(2 * SessionTable::kInUse);
   ASSERT_EQ(registry_.table().Evict([] { return false; }), 1);
   EXPECT_FALSE(first_->updated());
@@ -294,7 +294,7 @@ TEST_F(SessionUpdateTest, AnOpenerWhoCameBeforeTheUpdateGetsTheUpdatedSession) {
   EXPECT_EQ(budget_.reserved_bytes(), mesh_bytes_ + session->bytes_held());
 }
 
-TEST_F(SessionUpdateTest, WhatIsDeletedMeanwhileStaysDeleted) {
+TEST_F(SessionUpdateTest, ASessionDeletedDuringAnUpdateStaysDeleted) {
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   std::future<Updated> updated = Update("", Soften);

@@ -119,11 +119,11 @@ class SessionMemoryTest : public ::testing::TestWithParam<Case> {
   }
 
   WorkerPool pool_{1};
-  int64_t held_ = 0;      // told
+  int64_t held_ = 0;      // reported
   int64_t resident_ = 0;  // measured
 };
 
-TEST_P(SessionMemoryTest, IsReservedBeforeItIsTakenAndToldAsItIs) {
+TEST_P(SessionMemoryTest, IsReservedBeforeItIsTaken) {
   const Shape& shape = GetParam().shape;
   const TetMesh mesh = Bar(shape.cells);
   MemoryBudget budget(kPlenty);
@@ -186,7 +186,7 @@ class SharedPreparationTest : public ::testing::Test {
   SharedPreparation preparation_{&budget_, &pool_};
 };
 
-TEST_F(SharedPreparationTest, WhatIsThereIsNotMadeAgain) {
+TEST_F(SharedPreparationTest, ReusesAnExistingPreparation) {
   ASSERT_OK_AND_ASSIGN(const auto first, Make(DeformationModel::kLinearElastic));
   const int64_t held = preparation_.bytes_held();
   EXPECT_THAT(Begin(), IsOk());
@@ -274,7 +274,7 @@ TEST_F(SharedPreparationTest, TheBandIsMadeOnceForTheModelsOfTheSameVerticesAndR
   EXPECT_EQ(without->band, nullptr);
 }
 
-TEST_F(SharedPreparationTest, WhatIsRefusedLeavesWhatWasThereAndMayBeAskedForAgain) {
+TEST_F(SharedPreparationTest, ARefusalKeepsThePreparationAndMayBeRetried) {
   ASSERT_THAT(Make(DeformationModel::kGradientField), IsOk());
   const int64_t held = preparation_.bytes_held();
   {

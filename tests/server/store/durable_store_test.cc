@@ -143,7 +143,7 @@ TEST_F(DurableStoreTest, NobodyElseMayReadItsFiles) {
   EXPECT_GE(files, 7);
 }
 
-TEST_F(DurableStoreTest, WhatWasDeletedIsNowhereInItsFiles) {
+TEST_F(DurableStoreTest, DeletedRecordsAreNowhereInItsFiles) {
   ASSERT_THAT(Open(), IsOk());
   Fill(4);
   SessionRecord secret = SampleSession("secret", 5);
@@ -184,7 +184,7 @@ TEST_F(DurableStoreTest, ABackupReaderDoesNotStopADeleteAndTheLogIsEmptiedAfterI
   EXPECT_EQ(std::filesystem::file_size(log), 0U);
 }
 
-// As docs/operations.md tells it: the database first, then the files.
+// As docs/operations.md describes it: the database first, then the files.
 TEST_F(DurableStoreTest, ABackupThatWasMadeWhileItServesOpens) {
   ASSERT_THAT(Open(), IsOk());
   Fill(3);
@@ -342,7 +342,7 @@ TEST_F(DurableStoreTest, ADamagedPageCostsItsRowsOnly) {
   EXPECT_THAT(store_->damaged(), IsEmpty());
 }
 
-TEST_F(DurableStoreTest, WhatIsNoDatabaseIsRefusedAndLeftAsItIs) {
+TEST_F(DurableStoreTest, RefusesAFileThatIsNotADatabaseAndLeavesItUnchanged) {
   ASSERT_THAT(Open(), IsOk());
   Fill(1);
   store_.reset();

@@ -41,13 +41,13 @@ TEST(OrderedJobsTest, AJobThatWaitsHoldsUpItsOwnKeyAlone) {
   std::promise<void> released;
   std::shared_future<void> release = released.get_future().share();
   std::promise<void> other_ran;
-  std::atomic<bool> told = false;
+  std::atomic<bool> signaled = false;
   OrderedJobs jobs(2);  // ends first: its last jobs use the rest
   jobs.Submit("a", [release] { release.wait(); });
   // Some key is on the other thread.
   for (int i = 0; i < 32; ++i) {
     jobs.Submit(absl::StrCat("b", i), [&] {
-      if (!told.exchange(true)) other_ran.set_value();
+      if (!signaled.exchange(true)) other_ran.set_value();
     });
   }
   EXPECT_EQ(other_ran.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);

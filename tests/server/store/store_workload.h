@@ -30,7 +30,7 @@ struct StoreModel {
 // that stays was written between, so that a lost deletion shows.
 inline constexpr int kStepsOfARound = 19;
 
-// Tells the model. `bursts`: steps of several calls at once are made, too.
+// Applies the step to the model. `bursts`: steps of several calls at once are made, too.
 void ApplyStep(int number, bool bursts, StoreModel* model);
 
 // Makes the calls of a step and waits for their answers.

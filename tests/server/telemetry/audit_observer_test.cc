@@ -89,7 +89,7 @@ TEST_F(AuditObserverTest, ACallIsOneLineWithWhoWhatFromWhereAndHowItEnded) {
       "address":"192.0.2.1","request_id":"request-1","code":"NOT_FOUND","reason":"NOT_FOUND","duration_ms":3})"));
 }
 
-TEST_F(AuditObserverTest, AStreamIsToldWhenItOpensNamesItsResourceAndCloses) {
+TEST_F(AuditObserverTest, AStreamIsLoggedWhenItOpensNamesItsResourceAndCloses) {
   EXPECT_THAT(observer_->OnBegin(Call("DeformService.Deform", false)), IsOk());
   EXPECT_THAT(Events(), ElementsAre("open"));
   observer_->OnResource(Call("DeformService.Deform"));
@@ -98,7 +98,7 @@ TEST_F(AuditObserverTest, AStreamIsToldWhenItOpensNamesItsResourceAndCloses) {
   EXPECT_THAT(Events(), ElementsAre("open", "use", "close"));
 }
 
-TEST_F(AuditObserverTest, WhatTouchesNoContentIsLeftOut) {
+TEST_F(AuditObserverTest, OmitsCallsThatTouchNoContent) {
   EXPECT_THAT(Run("ServerInfoService.GetServerInfo"), IsOk());
   EXPECT_THAT(Run("AccessService.WhoAmI"), IsOk());
   EXPECT_THAT(Run("DeformService.AcknowledgeWatch"), IsOk());

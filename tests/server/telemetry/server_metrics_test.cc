@@ -13,7 +13,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(SecurityMetricsTest, WithoutTlsAndTokensOnlyWhetherItIsInsecureIsTold) {
+TEST(SecurityMetricsTest, WithoutTlsAndTokensReportsOnlyWhetherItIsInsecure) {
   MetricsPage page;
   AddSecurityMetrics({.insecure = true}, &page);
   EXPECT_THAT(page.Text(), AllOf(HasSubstr("tissueform_insecure 1\n"), Not(HasSubstr("alarm")),

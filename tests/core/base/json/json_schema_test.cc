@@ -87,7 +87,7 @@ TEST(JsonSchemaTest, AKeyIsReadFromTheVersionOnThatItCameWith) {
               IsRefused("key \"high_mm\" at /door came with version 2 of the format"));
 }
 
-TEST(JsonSchemaTest, AValueThatALaterVersionAllowsIsToldSo) {
+TEST(JsonSchemaTest, TheErrorNamesALaterVersionThatAllowsTheValue) {
   Json named = House(1);
   named["size"] = "large";
   EXPECT_THAT(Grown().Check(named), IsRefused("(as \"version\": 2 it would be read)"));
@@ -104,7 +104,7 @@ TEST(JsonSchemaTest, AKeyOfNoVersionIsUnknownInEachAndWhatIsAllowedIsOfThatVersi
   EXPECT_THAT(Grown().Check(House(2, R"("roof": 1)")), IsRefused("colour"));
 }
 
-TEST(JsonSchemaTest, KeysWithLineBreaksAndCommandsToATerminalAreToldOnOneLine) {
+TEST(JsonSchemaTest, ErrorsEscapeLineBreaksAndTerminalCommandsInKeys) {
   EXPECT_THAT(Grown().Check(House(1, R"("roof\n\u001b[2J": 1)")),
               IsRefused(R"(unknown key "roof\x0a\x1b[2J" at /)"));
 }
@@ -117,7 +117,7 @@ TEST(JsonSchemaTest, AFileOfANewerProgramIsRefusedAsSuch) {
               IsRefused("wrong value at /format"));
 }
 
-TEST(JsonSchemaTest, WhatIsNoVersionIsRefused) {
+TEST(JsonSchemaTest, RefusesInvalidVersions) {
   for (const char* version : {"0", "-1", "1.5", "\"1\"", "null", "[1]", "1e300"}) {
     Json house = House(1);
     house["version"] = Json::parse(version);

@@ -140,7 +140,7 @@ TEST(ChildProcessTest, ItOutlivesTheThreadThatStartedIt) {
   EXPECT_THAT(ReadToEnd(child->answer()), ::testing::StartsWith("still here|"));
 }
 
-TEST(ChildProcessTest, MissingProgramIsToldWithWhatToDo) {
+TEST(ChildProcessTest, ReportsAMissingProgramWithAdvice) {
   ChildOptions options;
   options.program = "/nonexistent/program";
   EXPECT_THAT(ChildProcess::Start(options),

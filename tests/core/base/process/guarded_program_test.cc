@@ -100,7 +100,7 @@ TEST(GuardedProgramTest, OneThatDoesNotWantToEndIsKilledAfterTheGrace) {
   EXPECT_TRUE(Closes(program->answer())) << "also what it has started";
 }
 
-TEST(GuardedProgramTest, WhatTheProgramLeavesBehindEndsWithIt) {
+TEST(GuardedProgramTest, RemainingChildrenEndWithTheProgram) {
   ASSERT_OK_AND_ASSIGN(const auto program,
                        GuardedProgram::Start(Shell("sleep 1000 & exit 3"), kGrace));
   EXPECT_EQ(program->Wait().exit_code, 3);
@@ -174,7 +174,7 @@ TEST_F(KilledStarterTest, ItsProgramsEndAlsoWhenTheyDoNotWantTo) {
   EXPECT_TRUE(Closes(ends_[0]));
 }
 
-TEST(GuardProgramTest, WrongUseIsTold) {
+TEST(GuardProgramTest, ReportsWrongUse) {
   ASSERT_OK_AND_ASSIGN(const std::string guard, FindProgram("tissueform-guard"));
   ChildOptions silent = Program(guard);
   silent.errors = ChildStream::Null();

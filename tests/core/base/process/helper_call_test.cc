@@ -71,7 +71,7 @@ TEST(HelperCallTest, CrashIsAnError) {
   }
 }
 
-TEST(HelperCallTest, WhatIsThrownIsAnError) {
+TEST(HelperCallTest, ExceptionsBecomeErrors) {
   EXPECT_THAT(Call("throw"), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("odd")));
 }
 
@@ -91,7 +91,7 @@ TEST(HelperCallTest, MemoryIsLimited) {
 }
 #endif
 
-TEST(HelperCallTest, WhatIsPrintedIsLostAndFilesStayEmpty) {
+TEST(HelperCallTest, OutputIsDiscardedAndFilesStayEmpty) {
   const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / "helper_call";
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
@@ -103,7 +103,7 @@ TEST(HelperCallTest, WhatIsPrintedIsLostAndFilesStayEmpty) {
   std::filesystem::remove(path);
 }
 
-TEST(HelperCallTest, MissingHelperIsToldWithWhatToDo) {
+TEST(HelperCallTest, ReportsAMissingHelperWithAdvice) {
   EXPECT_THAT(Call("nothing", {}, "tissueform-nothing"),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("build it")));
 }

@@ -60,7 +60,7 @@ void Answer(const IsolationLimits& limits, PipeReceiver* request, PipeSender* an
   while (waits) pause();
 }
 
-// Starts a helper that waits, tells its number on stdout, and waits too.
+// Starts a helper that waits, prints its number on stdout, and waits too.
 int CallAndWait() {
   const HelperCall call{"process_test_helper", "trying it", {}};
   const absl::Status status = CallHelper(

@@ -37,14 +37,14 @@ LabelGrid Horseshoe(double cut_off_mm) {
   return grid;
 }
 
-TEST(BorderCutTest, WhatDoesNotTouchTheBorderIsNotCut) {
+TEST(BorderCutTest, BoneThatDoesNotTouchTheBorderIsNotCut) {
   LabelGrid grid = Horseshoe(0);
   for (int i = 0; i < 120 * 80; ++i) grid.values[static_cast<size_t>(i)] = 0;
   EXPECT_FALSE(CutOffBelowMm(grid, 2).has_value());
   EXPECT_FALSE(CutOffBelowMm(Horseshoe(3), 1).has_value());
 }
 
-TEST(BorderCutTest, LittleIsToldFromMuch) {
+TEST(BorderCutTest, DistinguishesSmallCutsFromLargeOnes) {
   EXPECT_LT(CutOffBelowMm(Horseshoe(1), 2).value(), 3);
   EXPECT_GT(CutOffBelowMm(Horseshoe(6), 2).value(), 3);
   EXPECT_EQ(CutOffBelowMm(Horseshoe(20), 2).value(), std::numeric_limits<double>::infinity());

@@ -93,7 +93,7 @@ TEST(AttachedObjectsTest, AFingerThatTouchesTheFaceIsKept) {
   EXPECT_EQ(ShareKept(ct, head, in_finger), 1);
 }
 
-TEST(AttachedObjectsTest, ATubeIsTakenAwayAndItsPlaceOnTheSkinIsTold) {
+TEST(AttachedObjectsTest, RemovesATubeAndReportsItsPlaceOnTheSkin) {
   for (const int16_t wall_hu : {int16_t{300}, int16_t{60}}) {  // dense, or it leaves the CT
     SCOPED_TRACE(wall_hu);
     const HuGrid ct = Painted([&](const Vector3d& p, int16_t hu) { return Tube(p, hu, wall_hu); });
@@ -124,7 +124,7 @@ bool InCord(const HuGrid& bare, const Vector3d& p) {
          Interpolate(bare, p) < -500 && Interpolate(bare, p + Vector3d(0, 4, 0)) > -500;
 }
 
-TEST(AttachedObjectsTest, ACordThatLiesOnTheSkinAllAlongIsTakenAwayAndTold) {
+TEST(AttachedObjectsTest, RemovesAndReportsACordThatLiesOnTheSkin) {
   const HuGrid bare = HeadPhantom();
   const HuGrid ct = Painted([&](const Vector3d& p, int16_t) -> std::optional<int16_t> {
     if (InCord(bare, p)) return int16_t{250};
@@ -159,7 +159,7 @@ TEST(AttachedObjectsTest, AFoldOfSkinOfThatShapeIsKept) {
 }
 
 // A blanket that touches an ear may take it, but not unseen.
-TEST(AttachedObjectsTest, AnEarThatASheetTakesWithItIsTold) {
+TEST(AttachedObjectsTest, ReportsAnEarThatASheetRemoves) {
   const HuGrid ct = Painted([](const Vector3d& p, int16_t hu) -> std::optional<int16_t> {
     const bool sheet = std::abs(p.x() - 85) < 2 && p.y() > -60 && p.y() < 100 && p.z() > -100;
     if (hu < -500 && (InEar(p) || sheet)) return kSoftHu;

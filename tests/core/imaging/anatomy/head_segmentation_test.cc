@@ -77,10 +77,10 @@ TEST(HeadSegmentationTest, ValuesThatAreNotOfAHeadAreRefused) {
   EXPECT_THAT(SegmentHead(HuGrid(geometry, 40)), StatusIs(kInvalid, HasSubstr("above 250 HU")));
 }
 
-TEST(HeadSegmentationTest, StagesAreToldInOrder) {
+TEST(HeadSegmentationTest, ReportsStagesInOrder) {
   std::vector<double> fractions;
-  const auto tell = [&](absl::string_view, double fraction) { fractions.push_back(fraction); };
-  ASSERT_TRUE(SegmentHead(HeadPhantom(), {}, tell).ok());
+  const auto on_stage = [&](absl::string_view, double fraction) { fractions.push_back(fraction); };
+  ASSERT_TRUE(SegmentHead(HeadPhantom(), {}, on_stage).ok());
   EXPECT_GE(fractions.size(), 2U);
   EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
 }

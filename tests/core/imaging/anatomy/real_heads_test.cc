@@ -141,7 +141,7 @@ TEST(RealHeadsTest, TheBreathingTubeIsReplacedByAir) {
 }
 
 // The skin that it lies on: from the lip over the chin to the lower border.
-TEST(RealHeadsTest, TheBreathingTubeIsToldWithItsPlace) {
+TEST(RealHeadsTest, ReportsTheBreathingTubeWithItsPlace) {
   for (const double spacing_mm : {1.5, 2.0}) {
     SCOPED_TRACE(spacing_mm);
     ASSERT_OK_AND_ASSIGN(const HuGrid ct, LivingHead(spacing_mm));

@@ -171,7 +171,7 @@ TEST_F(DicomSeriesTest, RawBundledHeadWithInterceptZeroSaysWhatToAddAndThenIsRea
   EXPECT_EQ(volume.hu, whole.hu);
 }
 
-TEST_F(DicomSeriesTest, WhatTellsTwoScansApartIsFound) {
+TEST_F(DicomSeriesTest, FindsThePropertyThatDistinguishesTwoScans) {
   const std::vector<std::pair<uint32_t, std::string>> times = {
       {DicomFile::kAcquisitionTime, "acquisition time"}, {DicomFile::kContentTime, "content time"}};
   for (const double shift_mm : {0.5, 0.0}) {
@@ -199,7 +199,7 @@ TEST_F(DicomSeriesTest, WhatTellsTwoScansApartIsFound) {
   }
 }
 
-TEST_F(DicomSeriesTest, PlaceAloneTellsSlicesOffTheStepApart) {
+TEST_F(DicomSeriesTest, PlaceAloneDistinguishesSlicesOffTheStep) {
   Series all = Joined(LongPhantom(), Again({3, 4, 11, 14}, 0.5));
   TearApart(&all);
   WriteSeries(all);
@@ -293,7 +293,7 @@ TEST_F(DicomSeriesTest, OtherSizesAndOrientationsAreNeverJoined) {
   }
 }
 
-TEST_F(DicomSeriesTest, FramesOfReferenceThatTellSeriesApartKeepThemApart) {
+TEST_F(DicomSeriesTest, DifferentFramesOfReferenceKeepSeriesApart) {
   Series first = LongPhantom();
   Series second = LongPhantom();
   for (size_t i = 0; i < second.size(); ++i) {

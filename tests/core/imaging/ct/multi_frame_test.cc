@@ -60,7 +60,7 @@ TEST_F(MultiFrameTest, ScanMayBeSpreadOverSeveralFiles) {
   EXPECT_EQ(volume.provenance.num_files, 2);
 }
 
-// Two scans of the same places, which only the number of the acquisition tells apart.
+// Two scans of the same places, which only the number of the acquisition distinguishes.
 TEST_F(MultiFrameTest, ScansOfOneFileAreSeparatedByTheirAcquisitionNumbers) {
   const auto phantom = [](int in_second_scan) {
     std::vector<int> slices = {0, 1, 2, 3, 4, 5, 6, 7, 8};

@@ -21,7 +21,7 @@ using tissueform::testing::StatusIs;
 
 using ::tissueform::testing::kInvalid;
 
-TEST(PatientAxesTest, FortyEightWaysToLieAreToldApart) {
+TEST(PatientAxesTest, DistinguishesFortyEightOrientations) {
   const std::string letters = "LRAPSI";
   std::set<std::string> valid;
   for (const char a : letters) {

@@ -92,7 +92,7 @@ TEST_F(UnscannedTest, TwoFillingsAreOne) {
   EXPECT_EQ(unscanned[kMiddle + kSize * 14], 0);  // tissue behind the inner one
 }
 
-TEST_F(UnscannedTest, ACircleThatCutsNoTissueIsNotTold) {
+TEST_F(UnscannedTest, DoesNotReportACircleThatCutsNoTissue) {
   const CtVolume volume = Painted(
       [&](double x, double y) { return InCircle(x, y) ? Noisy(Head(x, y - 10)) : -1024.0; });
   EXPECT_TRUE(FindUnscanned(volume, 1).empty());

@@ -59,7 +59,7 @@ Named Assign(std::vector<LabelSegment> segments, const std::string& convention =
   return named;
 }
 
-TEST(SegmentNamesTest, TellsConventionsOfNumbersApartBySizeAndPlace) {
+TEST(SegmentNamesTest, DistinguishesNumberingConventionsBySizeAndPlace) {
   const Named dental = Assign({Numbered(1, 9000, 50), Numbered(2, 4000, 0), Numbered(3, 500, 12),
                                Numbered(4, 450, 8), Numbered(5, 20, -2)});
   EXPECT_THAT(dental.status, IsOk());

@@ -65,7 +65,7 @@ TEST(MetalDetectionTest, EnamelIsNoMetal) {
   EXPECT_TRUE(FindMetal(HeadWithTooth(Enamel)).mask.empty());
 }
 
-TEST(MetalDetectionTest, WhatReachesTheEndOfTheScannersScaleIsMetal) {
+TEST(MetalDetectionTest, VoxelsAtTheEndOfTheScannersScaleAreMetal) {
   const MetalFindings findings = FindMetal(HeadWithTooth([](double) { return 3071.0; }));
   ASSERT_EQ(findings.clusters.size(), 1U);
   EXPECT_NEAR(findings.clusters[0].volume_mm3, 4.0 / 3 * std::numbers::pi * 64 * 1.5, 15);
@@ -80,7 +80,7 @@ TEST(MetalDetectionTest, AnExtendedScaleShowsMetalByItsDensity) {
   EXPECT_EQ(findings.clusters.size(), 1U);
 }
 
-TEST(MetalDetectionTest, StreaksTellMetalFromEnamelOfTheSameDensity) {
+TEST(MetalDetectionTest, StreaksDistinguishMetalFromEnamelOfTheSameDensity) {
   CtVolume volume = HeadWithTooth(Enamel);
   AddStreaks(&volume);
   EXPECT_TRUE(FindMetal(volume).any());

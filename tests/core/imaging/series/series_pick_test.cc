@@ -225,7 +225,7 @@ TEST(SeriesFactsTest, WithoutCtSlicesTheMostFrequentKindCounts) {
   EXPECT_THAT(WhatIsAgainst(facts, SomeRule()), HasSubstr("modality is MR"));
 }
 
-TEST(PickSeriesTest, TheSofterKernelWinsAndTheOtherIsToldWhy) {
+TEST(PickSeriesTest, TheSofterKernelWinsAndTheOtherVerdictStatesWhy) {
   SeriesFacts sharp = FactsAfter([](Images* images) {
     for (ImageHeader& image : *images) image.convolution_kernel = "H60s";
   });

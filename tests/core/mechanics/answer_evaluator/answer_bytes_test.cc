@@ -101,7 +101,7 @@ TEST_P(AnswerBytesTest, ATableThatLiesIsFound) {
            {entry + 8, 8},            // not aligned
            {entry + 8, 0xfffffff0},   // beyond the end
            {entry + 12, 0xffffffff},  //
-           {entry + 12, 0},           // less than the others tell
+           {entry + 12, 0},           // less than the others state
        }) {
     bytes_ = good;
     Put(at, value);

@@ -123,8 +123,8 @@ TEST_F(HeadsBandTest, IsOffByAQuarterOfAStepAtMostOverRandomOperations) {
     head->band->Evaluate(poses, kLargestBandRotationRad, &expected);
     std::vector<float> given;
     ASSERT_TRUE(evaluator.Band(ToAnswerPoses(poses), &given));
-    const Eigen::Map<const Eigen::VectorXf> told(given.data(), expected.size());
-    ASSERT_LT((told - expected).cwiseAbs().maxCoeff(), 0.25 * kBandStepMm) << sample;
+    const Eigen::Map<const Eigen::VectorXf> reported(given.data(), expected.size());
+    ASSERT_LT((reported - expected).cwiseAbs().maxCoeff(), 0.25 * kBandStepMm) << sample;
     largest_mm = std::max<double>(largest_mm, expected.maxCoeff());
   }
   EXPECT_GT(largest_mm, 2) << "of bands that are worth a test";

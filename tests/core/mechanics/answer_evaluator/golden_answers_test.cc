@@ -124,7 +124,7 @@ class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
     return cases;
   }
 
-  // Whether an evaluator gives what the cases tell.
+  // Whether an evaluator gives what the cases state.
   static void Compare(const AnswerEvaluator& evaluator, const Json& cases) {
     ASSERT_EQ(cases.size(), 8U);
     for (size_t number = 0; number < cases.size(); ++number) {
@@ -306,7 +306,7 @@ TEST_F(GoldenBandTest, IsThatOfTheServer) {
   }
 }
 
-TEST_F(GoldenBandTest, WhatDoesNotFitIsRefused) {
+TEST_F(GoldenBandTest, RefusesABandWhoseSizesDoNotFit) {
   PortableAnswers broken = answers_;
   broken.band_map.pop_back();
   EXPECT_EQ(CheckAnswers(broken), "the band's sizes do not fit");

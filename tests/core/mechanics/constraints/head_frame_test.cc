@@ -73,24 +73,24 @@ TEST(HeadAnglesTest, TurnsAreThoseOfTheGoldenVectors) {
 TEST(HeadAnglesTest, AnglesAreThoseOfTheGoldenVectors) {
   for (const Json& rotation : GoldenVectors()["rotations"]) {
     const HeadAngles wanted = AnglesIn(rotation);
-    const HeadAngles told =
+    const HeadAngles found =
         AnglesFromRotationVector(VectorIn(rotation["rotation_vector_deg"]) * kDegree,
                                  FrameNamed(rotation["head_frame"].get<std::string>()));
-    EXPECT_LT(Apart(told.pitch_deg, wanted.pitch_deg), 1e-5) << rotation["name"];
-    EXPECT_LT(Apart(told.roll_deg, wanted.roll_deg), 1e-5) << rotation["name"];
-    EXPECT_LT(Apart(told.yaw_deg, wanted.yaw_deg), 1e-5) << rotation["name"];
+    EXPECT_LT(Apart(found.pitch_deg, wanted.pitch_deg), 1e-5) << rotation["name"];
+    EXPECT_LT(Apart(found.roll_deg, wanted.roll_deg), 1e-5) << rotation["name"];
+    EXPECT_LT(Apart(found.yaw_deg, wanted.yaw_deg), 1e-5) << rotation["name"];
   }
 }
 
-TEST(HeadAnglesTest, OneRotationIsToldInOneWay) {
+TEST(HeadAnglesTest, OneRotationHasOneSetOfAngles) {
   for (const Json& same : GoldenVectors()["same_rotation"]) {
     const HeadFrame frame = FrameNamed(same["head_frame"].get<std::string>());
-    const HeadAngles told =
+    const HeadAngles found =
         AnglesFromRotationVector(RotationVectorFromAngles(AnglesIn(same["given"]), frame), frame);
     const HeadAngles wanted = AnglesIn(same["told"]);
-    EXPECT_LT(Apart(told.pitch_deg, wanted.pitch_deg), 1e-5) << same["name"];
-    EXPECT_LT(Apart(told.roll_deg, wanted.roll_deg), 1e-5) << same["name"];
-    EXPECT_LT(Apart(told.yaw_deg, wanted.yaw_deg), 1e-5) << same["name"];
+    EXPECT_LT(Apart(found.pitch_deg, wanted.pitch_deg), 1e-5) << same["name"];
+    EXPECT_LT(Apart(found.roll_deg, wanted.roll_deg), 1e-5) << same["name"];
+    EXPECT_LT(Apart(found.yaw_deg, wanted.yaw_deg), 1e-5) << same["name"];
   }
 }
 

@@ -164,7 +164,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_P(ModelOnLaplacianTest, RowsHoldInEveryPose) {
   testing::ExpectRowsHoldInEveryPose(
       GetParam().options,
-      {.bilateral = 1e-11, .penetration = 1e-11, .told = 1e-11, .residual = 1e-9});
+      {.bilateral = 1e-11, .penetration = 1e-11, .reported_gap = 1e-11, .residual = 1e-9});
 }
 
 TEST_P(ModelOnLaplacianTest, AnswersDoNotDependOnTheDragBefore) {

@@ -32,14 +32,16 @@ class MeshPreparationTest : public ::testing::Test {
       ++admissions_;
       return bytes <= budget_ ? absl::OkStatus() : absl::ResourceExhaustedError("no room");
     };
-    options.observer = [this](const PreparationProgress& progress) { told_.push_back(progress); };
+    options.observer = [this](const PreparationProgress& progress) {
+      reported_.push_back(progress);
+    };
     return testing::PrepareMesh(mesh_, 1, options);
   }
 
   const TetMesh mesh_ = testing::Bar({4, 4, 8}, 2.0, 0.2);
   int admissions_ = 0;
   int64_t budget_ = int64_t{1} << 40;
-  std::vector<PreparationProgress> told_;
+  std::vector<PreparationProgress> reported_;
 };
 
 TEST_F(MeshPreparationTest, SecondModelDoesNotFactoriseAgain) {
@@ -156,7 +158,7 @@ TEST_F(MeshPreparationTest, ACancelledPreparationStopsAtItsNextStageAndMayBeAske
   EXPECT_GE(stages, 3) << "before the analysis, before the factor, before the columns";
 }
 
-TEST_F(MeshPreparationTest, EveryModelTellsItsStagesInOrderAndOnlyOfWhatItMakes) {
+TEST_F(MeshPreparationTest, EveryModelReportsItsOwnStagesInOrder) {
   for (const DeformationModel model :
        {DeformationModel::kGradientField, DeformationModel::kArap, DeformationModel::kLinearElastic,
         DeformationModel::kNeoHookean}) {
@@ -166,11 +168,11 @@ TEST_F(MeshPreparationTest, EveryModelTellsItsStagesInOrderAndOnlyOfWhatItMakes)
     options.model = model;
     // Its second factor goes with the harmonic fields.
     options.gradient_field.guidance = Guidance::kUniform;
-    told_.clear();
+    reported_.clear();
     ASSERT_THAT(CreateDeformer(preparation, options), IsOk());
     std::vector<PreparationStage> stages;
     int64_t step = 0;
-    for (const PreparationProgress& progress : told_) {
+    for (const PreparationProgress& progress : reported_) {
       if (stages.empty() || stages.back() != progress.stage) stages.push_back(progress.stage);
       EXPECT_GE(progress.step, step);
       EXPECT_LE(progress.step, progress.steps);
@@ -180,9 +182,9 @@ TEST_F(MeshPreparationTest, EveryModelTellsItsStagesInOrderAndOnlyOfWhatItMakes)
                             PreparationStage::kAssembling, PreparationStage::kOrdering,
                             PreparationStage::kFactorising, PreparationStage::kResponses));
     EXPECT_EQ(step, preparation->has_elastic() ? ElasticSystem::kColumnsPerHandle : 0);
-    told_.clear();
+    reported_.clear();
     ASSERT_THAT(CreateDeformer(preparation, options), IsOk());
-    EXPECT_TRUE(told_.empty()) << "it is there";
+    EXPECT_TRUE(reported_.empty()) << "it is there";
   }
 }
 

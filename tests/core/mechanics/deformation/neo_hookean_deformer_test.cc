@@ -82,7 +82,7 @@ TEST(NeoHookeanDeformerTest, DefaultToleranceIsRightToAFractionOfTheMovement) {
   EXPECT_LT(LargestDifference(quick.positions, tight.positions), 1e-4 * moved);
 }
 
-TEST(NeoHookeanDeformerTest, EnergyNeverRisesAndIsTold) {
+TEST(NeoHookeanDeformerTest, EnergyNeverRisesAndIsReported) {
   const auto preparation = PrepareBar().value();
   const auto answer = Create(preparation)->Deform({Pose({0, 0, 0}, {1, 0, 2})}).value();
   const SolveSummary& summary = answer.summary;
@@ -145,7 +145,7 @@ TEST(NeoHookeanDeformerTest, LinearStartThatInvertsTetsIsNoObstacle) {
   EXPECT_EQ(InvertedTets(*preparation, answer.positions), 0);
 }
 
-TEST(NeoHookeanDeformerTest, ImpossiblePoseIsToldByTheLoad) {
+TEST(NeoHookeanDeformerTest, TheLoadShowsAnImpossiblePose) {
   const auto preparation = PrepareBar().value();
   const Deformation answer =
       Create(preparation, {.max_iterations = 100})->Deform({Pose({0, 0, 0}, {0, 0, -20})}).value();

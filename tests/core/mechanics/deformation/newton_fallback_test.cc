@@ -222,7 +222,7 @@ TEST(NewtonFallbackTest, EnergyNeverRisesOnTheTongue) {
   ExpectFallingEnergies(answer.summary);
 }
 
-TEST(NewtonFallbackTest, MemoryIsAskedForOnceAndTold) {
+TEST(NewtonFallbackTest, MemoryIsRequestedOnceAndReported) {
   const auto preparation = PrepareLimb();
   std::vector<int64_t> asked;
   DeformControl control;

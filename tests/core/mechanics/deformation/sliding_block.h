@@ -125,7 +125,7 @@ struct RowTolerances {
   bool normals_turn = false;
   double bilateral = 0;
   double penetration = 0;
-  double told = 0;  // between a gap and ContactAnswer::gaps_mm
+  double reported_gap = 0;  // between a gap and ContactAnswer::gaps_mm
   double residual = 0;
 };
 
@@ -151,7 +151,7 @@ inline void ExpectRowsHoldInEveryPose(const DeformerOptions& options,
         EXPECT_NEAR(gap, 0, tolerances.bilateral);
       } else {
         EXPECT_GE(gap, -tolerances.penetration);
-        EXPECT_NEAR(gap, answer.contact.gaps_mm[unilateral++], tolerances.told);
+        EXPECT_NEAR(gap, answer.contact.gaps_mm[unilateral++], tolerances.reported_gap);
       }
     }
     EXPECT_THAT(answer.contact.forces, ::testing::Each(::testing::Ge(0)));

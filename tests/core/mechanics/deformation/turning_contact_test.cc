@@ -39,7 +39,7 @@ TEST(TurningContactTest, RowsHoldInEveryPose) {
   testing::ExpectRowsHoldInEveryPose(NeoHookean(), {.normals_turn = true,
                                                     .bilateral = 1e-6,
                                                     .penetration = 2e-3,
-                                                    .told = 1e-9,
+                                                    .reported_gap = 1e-9,
                                                     .residual = 2e-3});
 }
 
@@ -140,7 +140,7 @@ TEST(TurningContactTest, AnswersDoNotDependOnTheDragBefore) {
 }
 
 // Pressed through the block and far beyond.
-TEST(TurningContactTest, WhatCannotBeReachedIsSaid) {
+TEST(TurningContactTest, ReportsAPoseThatCannotBeReached) {
   const auto preparation = SlidingBlock().Prepare();
   const auto deformer = *CreateDeformer(preparation, NeoHookean());
   const Deformation answer = *deformer->Deform({Pose({0, 0, 0}, {0, 0, -15})});

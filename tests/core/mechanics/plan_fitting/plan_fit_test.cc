@@ -226,7 +226,7 @@ TEST(PlanFitTest, KnownPoseOfTheTongueIsFoundAgain) {
   ExpectSamePoses(fit.poses, known);
 }
 
-// The turn of a handle that is a point moves nothing: told, and left at rest.
+// The turn of a handle that is a point moves nothing: reported, and left at rest.
 TEST(PlanFitTest, OneTetFollowsItsCorner) {
   const TetMesh tet = testing::SingleTet();
   const ConstraintSet constraints = *ConstraintSet::Create(tet, {0, 1}, {{"corner", {2}}});
@@ -300,7 +300,7 @@ TEST_F(ShortBarTest, ErrorOfAnUnknownIsWhatAnotherWishMakesOfIt) {
               one.unknowns[0].determination.error_per_mm, 1e-3);
 }
 
-TEST_F(ShortBarTest, ContradictoryTargetsAreToldWithTheirMisses) {
+TEST_F(ShortBarTest, ReportsContradictoryTargetsWithTheirMisses) {
   request_.targets = {Along("more", 3), Along("less", 1), Along("base", 0, {0, 4, 3})};
   ASSERT_OK_AND_ASSIGN(const PlanFit fit, bar_.Fit(request_));
   EXPECT_THAT(fit.contradictions, ElementsAre(Pair(0, 1)));
@@ -312,7 +312,7 @@ TEST_F(ShortBarTest, ContradictoryTargetsAreToldWithTheirMisses) {
   EXPECT_NEAR(weighted.targets[1].missed_mm / weighted.targets[0].missed_mm, 9, 0.5);
 }
 
-TEST_F(ShortBarTest, WhatBoundsDoNotLetReachIsToldWithThem) {
+TEST_F(ShortBarTest, ReportsTheBoundThatKeepsATargetOutOfReach) {
   request_.targets = {Along("far", 9)};
   request_.moving[0].rotation = {};
   request_.moving[0].translation = {std::array{-1.0, 2.5}, std::array{-1.0, 1.0}};

@@ -59,7 +59,7 @@ class ResponseBasisTest : public ::testing::TestWithParam<std::tuple<TetMesh (*)
 };
 
 // A frame reads no more of the columns than its tolerance needs: the looser, the less.
-TEST_P(ResponseBasisTest, BoundHoldsForEveryToleranceAndTellsWhatWasRead) {
+TEST_P(ResponseBasisTest, BoundHoldsForEveryToleranceAndShowsWhatWasRead) {
   std::vector<double> errors;
   for (const double tolerance : {1e-2, 1e-4, 1e-6}) {
     ResponseBasisOptions options;

@@ -44,7 +44,7 @@ TEST(BandColumnsTest, EqualThatOfTheAnswerItself) {
   EXPECT_LT((Evaluate(bar, vertices) - expected).cwiseAbs().maxCoeff(), 1e-5F);
 }
 
-TEST(BandColumnsTest, ChosenVerticesAreToldInTheirOrder) {
+TEST(BandColumnsTest, ChosenVerticesKeepTheirOrder) {
   const UncertainBar bar(DeformationModel::kLinearElastic);
   const Eigen::VectorXf all = Evaluate(bar, AllVertices(bar.mesh));
   const std::vector<int32_t> chosen = {70, 40, 41};
@@ -84,7 +84,7 @@ TEST(BandColumnsTest, TurnsBeyondTheRangeHaveNone) {
   EXPECT_EQ(size_of(2, 2.5), 0);
 }
 
-TEST(BandColumnsTest, WhatTheAdmissionRefusesIsNotMade) {
+TEST(BandColumnsTest, IsNotMadeWhenTheAdmissionRefuses) {
   const UncertainBar bar(DeformationModel::kLinearElastic);
   const auto refuse = [](int64_t) { return absl::ResourceExhaustedError("no room"); };
   EXPECT_THAT(BandColumns::Create(bar.Prepare(), bar.uncertainty, {1}, refuse),

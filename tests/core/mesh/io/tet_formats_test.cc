@@ -245,7 +245,7 @@ TEST_F(TetFormatsTest, FormatBehindAnotherEndingIsNamedInOneLine) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("a mesh of tets is needed")));
 }
 
-TEST_F(TetFormatsTest, VtkIsToldApartByContent) {
+TEST_F(TetFormatsTest, ContentDistinguishesTheVtkFormats) {
   ASSERT_OK_AND_ASSIGN(const TetMeshFile legacy, ReadTetMesh(TwoTets("legacy_ascii.vtk")));
   ASSERT_THAT(WriteTetMesh(Path("two.vtu"), legacy), IsOk());
   ASSERT_OK_AND_ASSIGN(const TetMeshFile xml, Read("xml.vtk", BytesOfFile(Path("two.vtu"))));

@@ -61,7 +61,7 @@ class GivenPiecesTest : public ::testing::Test {
   }
   static absl::StatusOr<PlanBuild> Build(const Recipe& recipe) {
     return BuildPlan(TestDataPath("ct/headsq/headsq_quarter.nhdr"), recipe,
-                     {.threads = 2, .tell = {}});
+                     {.threads = 2, .on_stage = {}});
   }
   static const TriangleMesh& Jaw() { return cut->segments[0].surface; }
   std::string Path(const std::string& name) const { return folder_ + "/" + name; }
@@ -139,7 +139,7 @@ TEST_F(GivenPiecesTest, PieceInOtherAxesOrUnitsIsRefusedWithTheReason) {
   EXPECT_THAT(Refusal(), HasSubstr("also not in other axes"));
 }
 
-TEST_F(GivenPiecesTest, WhatIsNoPieceOrNoMovementIsRefused) {
+TEST_F(GivenPiecesTest, RefusesInvalidPiecesAndMovements) {
   recipe_.segments[0].surface->flip = true;
   EXPECT_THAT(Refusal(), HasSubstr("inside out"));
   recipe_.segments[0].surface->flip = false;

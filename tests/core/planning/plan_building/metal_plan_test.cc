@@ -41,7 +41,7 @@ absl::StatusOr<PlanBuild> BuildFrom(const CtVolume& ct) {
   const std::string path = absl::StrCat(::testing::TempDir(), "metal_plan_", getpid(), ".nrrd");
   TF_RETURN_IF_ERROR(WriteNrrd(path, ct));
   absl::StatusOr<PlanBuild> build =
-      BuildPlan(path, MetalRecipe(true), {.threads = kThreads, .tell = {}});
+      BuildPlan(path, MetalRecipe(true), {.threads = kThreads, .on_stage = {}});
   std::filesystem::remove(path);
   return build;
 }

@@ -26,7 +26,7 @@ absl::Status PrintRow(const std::string& name, const PlanBuild& plan, const Plan
 }
 
 absl::Status PrintTable(const std::string& folder, const std::vector<bool>& corrections) {
-  const PlanBuildOptions options{.threads = AvailableProcessors(), .tell = {}};
+  const PlanBuildOptions options{.threads = AvailableProcessors(), .on_stage = {}};
   TF_ASSIGN_OR_RETURN(const PlanBuild truth,
                       BuildPlan(folder + "/free.nrrd", MetalRecipe(true), options));
   std::cout << TableHead();

@@ -106,7 +106,7 @@ TEST_F(PlanBuildCallTest, CancelledCallHasEndedItsWork) {
   close(cancel[0]);
 }
 
-TEST_F(PlanBuildCallTest, KilledAndCrashedWorkersAreToldApart) {
+TEST_F(PlanBuildCallTest, DistinguishesKilledFromCrashedWorkers) {
   EXPECT_THAT(OutcomeAfter(SIGKILL),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("memory ran out")));
   EXPECT_THAT(OutcomeAfter(SIGUSR1),

@@ -89,7 +89,7 @@ TEST(PlanBuilderTest, BundledHeadBecomesAUsablePlan) {
   double last = 0;
   PlanBuildOptions options;
   options.threads = 2;
-  options.tell = [&last](absl::string_view stage, double fraction) {
+  options.on_stage = [&last](absl::string_view stage, double fraction) {
     EXPECT_FALSE(stage.empty());
     EXPECT_GE(fraction, last) << std::string(stage);
     last = fraction;
@@ -188,7 +188,7 @@ TEST(PlanBuilderTest, ProblemOfABuildEqualsThatOfItsFilesToTheLastBit) {
             read.deformer.gradient_field.max_iterations);
 }
 
-TEST(PlanBuilderTest, FirstErrorIsTold) {
+TEST(PlanBuilderTest, ReportsTheFirstError) {
   Recipe recipe = CoarseRecipe();
   recipe.ct.hu_offset.reset();
   EXPECT_THAT(BuildPlan(BundledCt(), recipe),
@@ -213,7 +213,7 @@ TEST(PlanBuilderTest, PlanMadeAnewCanBeDraggedFartherThanPlannedByAnyModel) {
   SetBlasThreads(1);
   ASSERT_OK_AND_ASSIGN(const Recipe recipe, ReadRecipe(TestDataPath("plans/head/recipe.json")));
   ASSERT_OK_AND_ASSIGN(const PlanBuild build,
-                       BuildPlan(BundledCt(), recipe, {.threads = 2, .tell = {}}));
+                       BuildPlan(BundledCt(), recipe, {.threads = 2, .on_stage = {}}));
   ASSERT_OK_AND_ASSIGN(PlanProblem problem, ToPlanProblem(build));
   problem.deformer.preparation.threads = 2;
   for (const DeformationModel model : kModels) {
@@ -238,7 +238,7 @@ TEST(PlanBuilderTest, BytesDoNotDependOnThreads) {
   std::vector<std::string> meshes;
   for (const int threads : {1, 2, 3}) {
     ASSERT_OK_AND_ASSIGN(const PlanBuild build,
-                         BuildPlan(BundledCt(), recipe, {.threads = threads, .tell = {}}));
+                         BuildPlan(BundledCt(), recipe, {.threads = threads, .on_stage = {}}));
     std::filesystem::remove_all(folder);
     std::filesystem::create_directories(folder);
     ASSERT_THAT(WritePlan(build, folder), IsOk());

@@ -98,7 +98,7 @@ TEST(RecipeTest, EveryKeyArrives) {
   EXPECT_EQ(recipe.model, DeformationModel::kLinearElastic);
 }
 
-TEST(RecipeTest, WhatIsWrittenIsReadTheSame) {
+TEST(RecipeTest, AWrittenRecipeIsReadBackUnchanged) {
   ASSERT_OK_AND_ASSIGN(const Recipe recipe,
                        Parse(R"("occlusal_plane": {"point_mm": [1, 2, 3], "normal": [0, 0.6, 0.8]},
                "contact_band_mm": 3.5)"));
@@ -142,10 +142,10 @@ TEST(RecipeTest, LabelsAreOfVersion5AndTheFileNameIsNotPassedOn) {
   EXPECT_EQ(given.labels.names[0].name, "lower jaw");
   EXPECT_EQ(given.labels.names[1].value, 2);
   EXPECT_EQ(given.labels.names[2].structure, Structure::kTube);
-  const std::string told = RecipeToJson(given);
-  EXPECT_THAT(told, HasSubstr("\"version\": 5"));
-  EXPECT_THAT(told, HasSubstr("lower jaw"));
-  EXPECT_THAT(told, ::testing::Not(HasSubstr("smith")));
+  const std::string written = RecipeToJson(given);
+  EXPECT_THAT(written, HasSubstr("\"version\": 5"));
+  EXPECT_THAT(written, HasSubstr("lower jaw"));
+  EXPECT_THAT(written, ::testing::Not(HasSubstr("smith")));
   EXPECT_THAT(parse("4", R"({"file": "a.nii"})"), StatusIs(kInvalid, HasSubstr("labels")));
   EXPECT_THAT(parse("5", R"({"names": {"jaw": [1]}})"),
               StatusIs(kInvalid, HasSubstr("use mandible, skull")));
@@ -166,10 +166,10 @@ TEST(RecipeTest, GrayValuesAreOfVersion6) {
   EXPECT_EQ(given.ct.values, CtValues::kGray);
   EXPECT_EQ(given.ct.tissue_above_gray, 242);
   EXPECT_EQ(given.ct.bone_above_gray, 605.5);
-  const std::string told = RecipeToJson(given);
-  EXPECT_THAT(told, HasSubstr("\"version\": 6"));
-  ASSERT_OK_AND_ASSIGN(const Recipe again, ParseRecipe(told, "again"));
-  EXPECT_EQ(RecipeToJson(again), told);
+  const std::string written = RecipeToJson(given);
+  EXPECT_THAT(written, HasSubstr("\"version\": 6"));
+  ASSERT_OK_AND_ASSIGN(const Recipe again, ParseRecipe(written, "again"));
+  EXPECT_EQ(RecipeToJson(again), written);
   EXPECT_EQ(again.ct.bone_above_gray, 605.5);
 
   ASSERT_OK_AND_ASSIGN(const Recipe hu, parse(6, R"({"values": "hu"})"));
@@ -202,10 +202,10 @@ TEST(RecipeTest, DissectionIsOfVersion7) {
   };
   ASSERT_OK_AND_ASSIGN(const Recipe given, parse(7, "6.5"));
   EXPECT_EQ(given.segments[0].dissected_mm, 6.5);
-  const std::string told = RecipeToJson(given);
-  EXPECT_THAT(told,
+  const std::string written = RecipeToJson(given);
+  EXPECT_THAT(written,
               ::testing::AllOf(HasSubstr("\"version\": 7"), HasSubstr("\"dissected_mm\": 6.5")));
-  ASSERT_OK_AND_ASSIGN(const Recipe again, ParseRecipe(told, "again"));
+  ASSERT_OK_AND_ASSIGN(const Recipe again, ParseRecipe(written, "again"));
   EXPECT_EQ(again.segments[0].dissected_mm, 6.5);
   for (const char* const wrong : {"-1", "20.5", "\"6\""}) {
     EXPECT_THAT(parse(7, wrong), StatusIs(kInvalid, HasSubstr("/segments/0/dissected_mm")))
@@ -293,7 +293,7 @@ TEST(RecipeTest, Version1HasTheDefaultsOfLaterKeysAndRefusesThem) {
   ASSERT_OK_AND_ASSIGN(const Recipe recipe, Parse(""));
   EXPECT_EQ(recipe.ct.join_series, JoinSeries::kAuto);
   EXPECT_TRUE(recipe.metal.correct);
-  // The tissues' defaults tell how far they are known, which version 1 cannot.
+  // The tissues' defaults state how far they are known, which version 1 cannot.
   EXPECT_THAT(RecipeToJson(recipe), HasSubstr("\"version\": 2"));
   constexpr char kTissues[] = R"("tissues": [{"name": "all", "youngs_modulus_pa": 20000}])";
   ASSERT_OK_AND_ASSIGN(const Recipe known, Parse(kTissues));

@@ -86,7 +86,7 @@ class SurfacesPlanTest : public ::testing::Test {
                 IsOk());
   }
   absl::StatusOr<PlanBuild> Build() const {
-    return BuildPlanFromSurfaces(Write(), {.threads = 2, .tell = {}});
+    return BuildPlanFromSurfaces(Write(), {.threads = 2, .on_stage = {}});
   }
   std::string Refusal() const {
     const absl::StatusOr<PlanBuild> build = Build();
@@ -157,7 +157,7 @@ TEST_F(SurfacesPlanTest, TheReportNamesSurfacesAndNoCt) {
   const absl::StatusOr<PlanBuild> build = Build();
   ASSERT_THAT(build.status(), IsOk());
   ASSERT_THAT(
-      WritePlanReport(*build, {.program_version = "1", .pictures = false, .tell = {}}, folder_),
+      WritePlanReport(*build, {.program_version = "1", .pictures = false, .on_stage = {}}, folder_),
       IsOk());
   for (const char* const name : {"/report.json", "/report.html"}) {
     EXPECT_THAT(WithoutNotes(folder_ + name, *build),
@@ -412,8 +412,8 @@ TEST(SurfacesOfBundledHeadTest, PredictsWhatThePlanOfTheCtPredicts) {
   mandible.name = "mandible";
   mandible.pose.translation_mm.y() = 6;
   recipe.segments = {mandible};
-  const absl::StatusOr<PlanBuild> ct =
-      BuildPlan(TestDataPath("ct/headsq/headsq_quarter.nhdr"), recipe, {.threads = 2, .tell = {}});
+  const absl::StatusOr<PlanBuild> ct = BuildPlan(TestDataPath("ct/headsq/headsq_quarter.nhdr"),
+                                                 recipe, {.threads = 2, .on_stage = {}});
   ASSERT_THAT(ct.status(), IsOk());
   const std::string folder = ::testing::TempDir() + "/surfaces_of_bundled_head";
   std::filesystem::create_directories(folder);
@@ -434,7 +434,7 @@ TEST(SurfacesOfBundledHeadTest, PredictsWhatThePlanOfTheCtPredicts) {
                                                       {"pose", {{"translation_mm", {0, 6, 0}}}}}}}}
                                                   .dump();
   const absl::StatusOr<PlanBuild> surfaces =
-      BuildPlanFromSurfaces(folder + "/surfaces.json", {.threads = 2, .tell = {}});
+      BuildPlanFromSurfaces(folder + "/surfaces.json", {.threads = 2, .on_stage = {}});
   ASSERT_THAT(surfaces.status(), IsOk());
   const absl::StatusOr<PlanDifference> difference =
       ComparePlans(*surfaces, *ct, DeformationModel::kLinearElastic);

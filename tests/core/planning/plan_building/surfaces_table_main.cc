@@ -30,7 +30,7 @@ absl::Status Run(char** arguments) {
   const std::string folder = arguments[4];
   TF_ASSIGN_OR_RETURN(const Recipe recipe, ReadRecipe(arguments[2]));
   TF_ASSIGN_OR_RETURN(const PlanBuild ct,
-                      BuildPlan(arguments[1], recipe, {.threads = kThreads, .tell = {}}));
+                      BuildPlan(arguments[1], recipe, {.threads = kThreads, .on_stage = {}}));
   TF_ASSIGN_OR_RETURN(const ExportedHead head, ExportHead(ct.head.hu, ct.parts.labels, 4));
   TF_RETURN_IF_ERROR(WriteHead(head, folder));
   nlohmann::json json = nlohmann::json::parse(std::ifstream(arguments[3]));
@@ -40,7 +40,7 @@ absl::Status Run(char** arguments) {
   std::ofstream(folder + "/surfaces.json") << json.dump(2);
   TF_ASSIGN_OR_RETURN(
       const PlanBuild surfaces,
-      BuildPlanFromSurfaces(folder + "/surfaces.json", {.threads = kThreads, .tell = {}}));
+      BuildPlanFromSurfaces(folder + "/surfaces.json", {.threads = kThreads, .on_stage = {}}));
   TF_ASSIGN_OR_RETURN(const PlanDifference difference,
                       ComparePlans(surfaces, ct, DeformationModel::kLinearElastic));
   std::printf("%s%s\nlargest difference of movement %.2f mm; segment volumes %.1f and %.1f cm3\n",

@@ -288,7 +288,7 @@ TEST(ThinNoseTest, ANoseWithWallsOf2MmIsMeshedWhole) {
 }
 
 // The cut is neither skin, on either side, nor passed over in silence; the rest is judged as ever.
-TEST_F(WholeFaceTest, ANoseThatTheScannersCircleCutsHasNoSkinThereAndThatIsTold) {
+TEST_F(WholeFaceTest, ReportsANoseWithoutSkinWhereTheScannersCircleCutsIt) {
   constexpr double kSpacingMm = 1.5;
   const Vector3d tip = shared_face->landmarks.nose_tip;
   const Circle circle{
@@ -347,12 +347,12 @@ TEST_F(WholeFaceTest, ANoseThatTheScannersCircleCutsHasNoSkinThereAndThatIsTold)
   }
   EXPECT_GT(at_cut, 10);
 
-  // Not told of the circle, it takes the cut for skin.
+  // Without the circle, it takes the cut for skin.
   face.head.cut = {};
-  ASSERT_OK_AND_ASSIGN(const SkinCoverage untold,
+  ASSERT_OK_AND_ASSIGN(const SkinCoverage without_circle,
                        face.Coverage(face.mesh.surface, face.regions, kBundledVoxelMm));
-  EXPECT_TRUE(untold.cuts.empty());
-  EXPECT_GT(skin_at_cut(untold), 50);
+  EXPECT_TRUE(without_circle.cuts.empty());
+  EXPECT_GT(skin_at_cut(without_circle), 50);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ PlanBuild WholeHead() {
 
 TEST(CautionsTest, AWholeHeadNeedsNone) { EXPECT_THAT(Cautions(WholeHead()), IsEmpty()); }
 
-TEST(CautionsTest, WhatIsMissingIsTold) {
+TEST(CautionsTest, ReportsAMissingNoseAndChin) {
   PlanBuild build = WholeHead();
   build.landmarks.nose_prominence_mm = 0.24;
   EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("is 0.2 mm in front of")));
@@ -56,20 +56,20 @@ TEST(CautionsTest, ThoseOfSurfacesNameNoCt) {
                                            HasSubstr("4 mm")));
 }
 
-TEST(CautionsTest, ChinThatTheBorderCutsIsTold) {
+TEST(CautionsTest, ReportsAChinThatTheBorderCuts) {
   PlanBuild build = WholeHead();
   build.landmarks.menton.z() = -100;
   build.parts.cut_off_mm = 1.44;
   EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("about 1.4 mm of its bone")));
 }
 
-TEST(CautionsTest, TetsThatStayTornAreTold) {
+TEST(CautionsTest, ReportsTetsThatStayInverted) {
   PlanBuild build = WholeHead();
   build.num_inverted = 3;
   EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("3 tets are inverted")));
 }
 
-TEST(CautionsTest, TeethThatWereCutApartAreToldUnlessTheRecipeSaysWhere) {
+TEST(CautionsTest, ReportsSeparatedTeethUnlessTheRecipeGivesTheCut) {
   PlanBuild build = WholeHead();
   build.parts.separation = JawSeparation::kAutomaticCut;
   EXPECT_THAT(Cautions(build), ElementsAre(HasSubstr("teeth touch")));

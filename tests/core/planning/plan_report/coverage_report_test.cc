@@ -41,7 +41,7 @@ TEST(CoverageReportTest, AFaceWithoutGapsPassesWithoutACaution) {
   EXPECT_EQ(CoverageJson(WithNose(1981))["regions"]["nose"]["covered_share"], 1981.0 / 2000);
 }
 
-TEST(CoverageReportTest, WhatARegionLacksIsCalledHairOrClothWhereItIsLooserThanFat) {
+TEST(CoverageReportTest, ReportsMissingSkinAsHairOrClothWhereItIsLooserThanFat) {
   SkinCoverage coverage = WithNose(1900);
   EXPECT_THAT(CoverageCautions(coverage), ElementsAre(Not(HasSubstr("cloth"))));
   coverage.regions[static_cast<size_t>(SkinRegion::kNose)].hu_behind_missing = -446;
@@ -72,7 +72,7 @@ ScannerCut CutOf(SkinRegion region, double mm2) {
   return cut;
 }
 
-TEST(CoverageReportTest, ACutOfTheScannersCircleIsToldAndNoReasonToRefuse) {
+TEST(CoverageReportTest, ReportsACutByTheScannersCircleWithoutFailing) {
   SkinCoverage coverage = WithNose(2000);
   coverage.cuts = {CutOf(SkinRegion::kNose, 345), CutOf(SkinRegion::kNone, 12)};
   EXPECT_THAT(Passed(coverage), ElementsAre(true, true, true, true));
@@ -90,7 +90,7 @@ TEST(CoverageReportTest, ACutOfTheScannersCircleIsToldAndNoReasonToRefuse) {
   EXPECT_EQ(CoverageJson(coverage)["cut_by_scanner"].size(), 1U);
 }
 
-TEST(CoverageReportTest, GapsAndHolesAreToldWithTheirPlace) {
+TEST(CoverageReportTest, ReportsGapsAndHolesWithTheirPlace) {
   SkinCoverage coverage = WithNose(2000);
   coverage.holes = {{SkinRegion::kLeftCheek, 72, 6.5, {1, 2, 3}, -320},
                     {SkinRegion::kChin, 9, 2.6, {4, 5, 6}}};
@@ -105,7 +105,7 @@ TEST(CoverageReportTest, GapsAndHolesAreToldWithTheirPlace) {
   EXPECT_THAT(Passed(coverage), ElementsAre(true, true, true, false));
 }
 
-TEST(CoverageReportTest, BoneInTheSkinIsTold) {
+TEST(CoverageReportTest, ReportsBoneInTheSkin) {
   SkinCoverage coverage = WithNose(2000);
   coverage.mesh_skin_mm2 = 30000;
   coverage.mesh_skin_on_bone_mm2 = 200;
@@ -115,7 +115,7 @@ TEST(CoverageReportTest, BoneInTheSkinIsTold) {
               ElementsAre(AllOf(HasSubstr("3.0 %"), HasSubstr("9.0 cm2"))));
 }
 
-TEST(CoverageReportTest, WhatIsMissingIsRedInThePicture) {
+TEST(CoverageReportTest, MissingSkinIsRedInThePicture) {
   SkinCoverage coverage = WithNose(2000);
   coverage.positions = Positions::Zero(3, 3);
   coverage.triangles = TriangleIndices{{0, 1, 2}, {0, 2, 1}, {1, 2, 0}};

@@ -14,7 +14,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-TEST(LipsReportTest, ClosedLipsAreToldWithPlaceAndSize) {
+TEST(LipsReportTest, ReportsClosedLipsWithPlaceAndSize) {
   const LipContact contact{
       .examined_mm = 31, .width_mm = 24, .area_mm2 = 192, .depth_mm = 8, .place_mm = {12, -60, 31}};
   EXPECT_THAT(LipsCautions(contact), ElementsAre(AllOf(HasSubstr("24"), HasSubstr("192 mm2"),

@@ -32,7 +32,7 @@ PlanBuild HeadUnder(ObjectKind kind) {
   return build;
 }
 
-TEST(ObjectsReportTest, TheSkinUnderATubeIsToldWithPlaceAndSize) {
+TEST(ObjectsReportTest, ReportsTheSkinUnderATubeWithPlaceAndSize) {
   const PlanBuild build = HeadUnder(ObjectKind::kTube);
   EXPECT_THAT(ObjectsCautions(build),
               ElementsAre(AllOf(HasSubstr("A tube"), HasSubstr("1.9 cm3"), HasSubstr("0.8 cm2"),
@@ -52,7 +52,7 @@ TEST(ObjectsReportTest, APieceThatMayBeFaceKeepsThePlanFromBeingReady) {
   EXPECT_THAT(FailedText(CheckQuality(build, MeasurePlan(build))), HasSubstr("may be face"));
 }
 
-TEST(ObjectsReportTest, WhatLiesBesideTheRegionOfInterestIsListedOnly) {
+TEST(ObjectsReportTest, ObjectsOutsideTheRegionOfInterestAreListedOnly) {
   PlanBuild build = HeadUnder(ObjectKind::kUnknown);
   build.soft_tissue.region.below.point_mm.z() = 40;
   EXPECT_TRUE(CheckObjects(build).passed);

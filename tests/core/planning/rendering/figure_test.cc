@@ -76,7 +76,7 @@ class FigureTest : public ::testing::Test {
     std::filesystem::create_directories(folder_);
   }
 
-  // A small picture of that scene alone: a number that tells pictures apart.
+  // A small picture of that scene alone: a number that distinguishes pictures.
   size_t PictureOf(const Scene& scene) const {
     Figure figure("", 120);
     figure.AddRow(100, {scene});

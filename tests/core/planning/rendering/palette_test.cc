@@ -51,7 +51,7 @@ TEST(PaletteTest, LightnessFallsAtEveryStepByAboutAsMuch) {
 }
 
 // 2.3 is a difference that is just noticed; a palette may be uneven in colour by a factor of two.
-TEST(PaletteTest, NeighboursAreToldApartAndNoStepStandsOut) {
+TEST(PaletteTest, NeighboursAreDistinctAndNoStepStandsOut) {
   double least = HUGE_VAL;
   double most = 0;
   for (size_t c = 0; c + 1 < MapColours().size(); ++c) {

@@ -29,7 +29,7 @@ Json WithKey(const std::string& name, const Json& value) {
 
 struct BadKeys {
   const char* name;
-  const char* told;
+  const char* error;
   std::function<std::string()> make;
 };
 
@@ -39,7 +39,7 @@ TEST_P(BadKeysTest, AreRefusedAtTheStartInOneLine) {
   const TokenFiles files;
   Replace(files.keys(), GetParam().make());
   const absl::Status status = TokenAuthenticator::Start(files.Options()).status();
-  EXPECT_THAT(status, StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().told)));
+  EXPECT_THAT(status, StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().error)));
   EXPECT_TRUE(absl::StartsWith(status.message(), "--token-keys: ")) << status;
   EXPECT_FALSE(absl::StrContains(status.message(), "\n"));
 }

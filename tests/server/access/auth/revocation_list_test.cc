@@ -55,14 +55,14 @@ TEST(RevocationListTest, HoldsTokensByDigestAndIdAndAllThatAPrincipalHadBefore) 
 struct BadList {
   const char* name;
   const char* text;
-  const char* told;
+  const char* error;
 };
 
 class BadListTest : public ::testing::TestWithParam<BadList> {};
 
 TEST_P(BadListTest, IsRefusedAndSaysNothing) {
   EXPECT_THAT(RevocationList::Parse(GetParam().text),
-              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().told)));
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().error)));
   const TokenFiles files;
   ASSERT_OK_AND_ASSIGN(const auto authenticator, TokenAuthenticator::Start(files.Options()));
   Replace(files.revocations(), GetParam().text);

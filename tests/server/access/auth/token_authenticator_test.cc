@@ -202,7 +202,7 @@ std::string SentenceOf(const std::string& name, const Json& value) {
       Ask(authenticator.get(), WithClaims(With(GoodClaims(), name, value))).status().message());
 }
 
-TEST(RefusedTokenTest, ATokenWithAGoodSignatureIsToldWhatIsExpectedOfIt) {
+TEST(RefusedTokenTest, TheErrorOfASignedTokenStatesWhatIsExpected) {
   EXPECT_THAT(SentenceOf("iss", "https://sts.example/1/"),
               HasSubstr("issuer is \"https://sts.example/1/\"; this server accepts only tokens of "
                         "\"https://login.example\""));
@@ -212,7 +212,7 @@ TEST(RefusedTokenTest, ATokenWithAGoodSignatureIsToldWhatIsExpectedOfIt) {
   EXPECT_THAT(SentenceOf("aud", Json::array({"a", 1})), HasSubstr("audience is \"a, 1\", and"));
 }
 
-TEST(RefusedTokenTest, ATokenIsToldByHowMuchTheClocksDiffer) {
+TEST(RefusedTokenTest, TheErrorStatesByHowMuchTheClocksDiffer) {
   const TokenFiles files;
   const auto now = std::chrono::system_clock::now();
   const auto at = [&](std::chrono::seconds later) {
@@ -228,7 +228,7 @@ TEST(RefusedTokenTest, ATokenIsToldByHowMuchTheClocksDiffer) {
               HasSubstr("expired 5m"));
 }
 
-TEST(RefusedTokenTest, WhatIsSaidOfAClaimIsBoundedAndPrintable) {
+TEST(RefusedTokenTest, TheErrorQuotesAClaimBoundedAndPrintable) {
   const std::string sentence =
       SentenceOf("iss", absl::StrCat("https://e\x1b[31m\"\n\u00e9", std::string(5000, 'a')));
   EXPECT_THAT(sentence, HasSubstr("\"https://e?[31m????aaa"));

@@ -127,7 +127,7 @@ TEST_F(BackupTest, IsWholeWhileOthersWriteAndDelete) {
   writer.join();
 }
 
-TEST_F(BackupTest, WhatIsDeletedBetweenRowsAndFilesIsInNeither) {
+TEST_F(BackupTest, CasesDeletedBetweenRowsAndFilesAreInNeither) {
   std::map<std::string, int> numbers;
   for (int number = 5000; number < 5004; ++number) numbers[KeepCaseOf(number)] = number;
   std::vector<std::string> cases;
@@ -150,7 +150,7 @@ TEST_F(BackupTest, WhatIsDeletedBetweenRowsAndFilesIsInNeither) {
   ExpectHolds(backup_, model_);
 }
 
-TEST_F(BackupTest, ARowWhoseFileIsLostIsToldAndNothingIsLeft) {
+TEST_F(BackupTest, ReportsARowWithoutItsFileAndLeavesNothing) {
   const std::string sha256 = KeepCaseOf(5000);
   fs::remove(data_ + "/blobs/" + sha256);
   EXPECT_THAT(BackUp(data_, backup_), StatusIs(absl::StatusCode::kAborted, HasSubstr("missing")));
@@ -162,7 +162,7 @@ TEST_F(BackupTest, AFolderOfSomethingElseIsNoBackup) {
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("not a backup")));
 }
 
-TEST_F(BackupTest, ADamagedFileIsToldAndNothingIsLeft) {
+TEST_F(BackupTest, ReportsADamagedFileAndLeavesNothing) {
   const std::string sha256 = KeepCaseOf(5000);
   fs::resize_file(data_ + "/blobs/" + sha256, 3);
   EXPECT_THAT(BackUp(data_, backup_), StatusIs(absl::StatusCode::kDataLoss, HasSubstr(sha256)));

@@ -86,7 +86,7 @@ TEST_F(AuditLogTest, PlacesAreLimitedAndComeBack) {
   EXPECT_TRUE(HasReason(log_->Reserve(1), ErrorReason::kAuditNotWritten));
 }
 
-TEST_F(AuditLogTest, WhatFindsNoRoomIsCountedAndTold) {
+TEST_F(AuditLogTest, CountsAndReportsMessagesThatFindNoRoom) {
   Start({.lost_message = [](int64_t count) { return absl::StrCat("lost ", count); },
          .max_waiting = 1});
   ASSERT_THAT(log_->Reserve(1), IsOk());

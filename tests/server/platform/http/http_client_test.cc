@@ -40,7 +40,7 @@ class SilentServer {
   const int listener_;
 };
 
-TEST(ReadUrl, TellsWhereSecretsMayGo) {
+TEST(ReadUrl, RecognizesConfidentialUrls) {
   for (const char* url : {"https://a.example/keys", "HTTPS://a", "http://localhost:9",
                           "http://127.0.0.1", "http://[::1]:9/x"}) {
     ASSERT_TRUE(ReadUrl(url)) << url;
@@ -57,7 +57,7 @@ TEST(ReadUrl, TellsWhereSecretsMayGo) {
   }
 }
 
-TEST(ReadUrl, TellsLoginsAndQueries) {
+TEST(ReadUrl, RecognizesLoginsAndQueries) {
   EXPECT_FALSE(ReadUrl("https://a/b")->has_login);
   EXPECT_FALSE(ReadUrl("https://a/b")->has_query);
   for (const char* url : {"https://user@a", "https://user:secret@a", "https://:secret@a"}) {

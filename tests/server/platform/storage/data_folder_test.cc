@@ -54,7 +54,7 @@ TEST(DataFolderTest, OneThatOthersMayEnterIsRefused) {
   }
 }
 
-TEST(DataFolderTest, WhatIsNoFolderIsRefused) {
+TEST(DataFolderTest, RefusesPathsThatAreNotFolders) {
   const ScratchFolder scratch;
   std::ofstream(scratch / "file") << "text";
   EXPECT_THAT(DataFolder::Open(scratch / "file").status(),
@@ -63,7 +63,7 @@ TEST(DataFolderTest, WhatIsNoFolderIsRefused) {
   EXPECT_FALSE(DataFolder::Open("/proc/nothing/can/be/made/here").ok());
 }
 
-TEST(DataFolderTest, IsHeldByOneAtATimeAndTheOtherIsToldByWhom) {
+TEST(DataFolderTest, IsHeldByOneAtATimeAndTheErrorNamesTheHolder) {
   const ScratchFolder scratch;
   {
     ASSERT_OK_AND_ASSIGN(DataFolder first, DataFolder::Open(scratch / "data"));

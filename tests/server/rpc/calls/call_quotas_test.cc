@@ -78,7 +78,7 @@ TEST_F(CallQuotasTest, StreamsAndOtherCallsHavePlacesOfTheirOwn) {
   EXPECT_TRUE(quotas_.Begin("a", CallKind::kMetadata).ok());
 }
 
-TEST_F(CallQuotasTest, WhoHasGoneIsForgottenButNotWhoHasACallOpen) {
+TEST_F(CallQuotasTest, ForgetsIdlePrincipalsButNotOnesWithAnOpenCall) {
   for (int i = 0; i < 1000; ++i) LetIn("gone " + std::to_string(i), 1);
   EXPECT_TRUE(quotas_.Begin("here", CallKind::kStream).ok());
   EXPECT_EQ(quotas_.num_principals(), 1001);

@@ -108,21 +108,21 @@ TEST(CallScopeTest, AStreamGoesOnWithATokenOfTheSamePrincipalOnly) {
 class Notes : public CallObserver {
  public:
   absl::Status OnBegin(const ObservedCall& call) override {
-    told.push_back(
+    events.push_back(
         absl::StrCat("begin ", std::string(call.method), " ", std::string(call.resource)));
     return refusal;
   }
   void OnResource(const ObservedCall& call) override {
-    told.push_back(absl::StrCat("resource ", std::string(call.resource)));
+    events.push_back(absl::StrCat("resource ", std::string(call.resource)));
   }
   void OnEnd(const ObservedCall& call, const absl::Status& outcome,
              std::chrono::steady_clock::duration /*elapsed*/) override {
-    told.push_back(absl::StrCat("end ", std::string(call.resource), " ",
-                                absl::StatusCodeToString(outcome.code())));
+    events.push_back(absl::StrCat("end ", std::string(call.resource), " ",
+                                  absl::StatusCodeToString(outcome.code())));
   }
 
   absl::Status refusal;
-  std::vector<std::string> told;
+  std::vector<std::string> events;
 };
 
 TEST(CallScopeTest, AnObserverHearsOfEveryCallOnce) {
@@ -132,8 +132,8 @@ TEST(CallScopeTest, AnObserverHearsOfEveryCallOnce) {
   CallScope moved = std::move(scope);
   moved.SetResource("sessions/a");
   EXPECT_FALSE(moved.End(absl::NotFoundError("gone")).ok());
-  EXPECT_THAT(notes.told, ::testing::ElementsAre("begin Test.Call ", "resource sessions/a",
-                                                 "end sessions/a NOT_FOUND"));
+  EXPECT_THAT(notes.events, ::testing::ElementsAre("begin Test.Call ", "resource sessions/a",
+                                                   "end sessions/a NOT_FOUND"));
 }
 
 TEST(CallScopeTest, AnObserverCanRefuseACall) {
@@ -141,7 +141,7 @@ TEST(CallScopeTest, AnObserverCanRefuseACall) {
   notes.refusal = absl::UnavailableError("the audit log cannot be written");
   AdmissionControl gate({.observer = &notes});
   EXPECT_EQ(AdmissionOf(CallKind::kMetadata, &gate), absl::StatusCode::kUnavailable);
-  EXPECT_EQ(notes.told.size(), 2);
+  EXPECT_EQ(notes.events.size(), 2);
 }
 
 TEST(CallScopeTest, ACallWithoutRequestIdGetsOneOfItsOwn) {

@@ -53,7 +53,7 @@ TEST(StatusConversionTest, ErrorsCarryTheirReasonAsGoogleRpcSaysIt) {
   EXPECT_EQ(info.metadata().at("limit"), "64");
 }
 
-TEST(StatusConversionTest, WhenToTryAgainIsToldAsGoogleHasIt) {
+TEST(StatusConversionTest, ReportsTheRetryDelayAsGooglesRetryInfo) {
   const google::rpc::Status details = DetailsOf(
       ToGrpcStatus(WithReason(absl::ResourceExhaustedError("too often"),
                               ErrorReason::kQuotaExceeded, {{"retry_after_ms", "1500"}})));

@@ -24,7 +24,7 @@ namespace {
 using ::testing::Contains;
 using Kind = StoreChange::Kind;
 
-TEST(StoreChangeTest, WhatIsNotKnownMeansThatAnythingMayHaveChanged) {
+TEST(StoreChangeTest, AnUnknownNoticeMeansThatAnythingMayHaveChanged) {
   EXPECT_EQ(ParseStoreChange("session_deleted a b"),
             (StoreChange{.kind = Kind::kSessionDeleted, .name = "a b"}));
   EXPECT_EQ(ParseStoreChange("exports_changed "), (StoreChange{.kind = Kind::kExportsChanged}));
@@ -61,7 +61,7 @@ class ChangeListenerTest : public ::testing::Test {
   std::unique_ptr<ChangeListener> listener_;
 };
 
-TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndNothingElse) {
+TEST_F(ChangeListenerTest, ReportsOnlyWhatOthersMustKnowAndInOrder) {
   ASSERT_OK_AND_ASSIGN(const SessionRecord record,
                        CreateSession(stores_->sessions(), SampleSession("s", 1)));
   ASSERT_THAT(UpdateSession(stores_->sessions(), record), IsOk());
@@ -91,7 +91,7 @@ TEST_F(ChangeListenerTest, WhatOthersMustKnowIsToldInOrderAndNothingElse) {
   EXPECT_EQ(SeenUntil(last), expected);
 }
 
-TEST_F(ChangeListenerTest, WhoWasCutOffIsToldThatAnythingMayHaveChangedAndListensAgain) {
+TEST_F(ChangeListenerTest, ReportsMissedChangesAfterACutAndListensAgain) {
   RunSql(
       "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = "
       "'tissueform-server' AND pid <> pg_backend_pid()");

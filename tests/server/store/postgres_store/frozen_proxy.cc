@@ -129,9 +129,9 @@ void FrozenProxy::Forward(int client, int generation, bool until_ready) {
       open = !asked.empty() && Write(database, asked);
     }
     if (open && sides[1].revents != 0) {
-      const std::string told = Read(database);
-      open = !told.empty() && Write(client, told);
-      if (until_ready && absl::EndsWith(told, kReady)) generation = -1;
+      const std::string received = Read(database);
+      open = !received.empty() && Write(client, received);
+      if (until_ready && absl::EndsWith(received, kReady)) generation = -1;
     }
   }
   close(database);

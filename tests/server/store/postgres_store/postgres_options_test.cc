@@ -41,7 +41,7 @@ TEST(PostgresOptionsTest, AUrlBecomesKeywordsAndANameForMessages) {
             HasSubstr("target_session_attrs='read-write'"), HasSubstr("tcp_user_timeout='10000'")));
 }
 
-TEST(PostgresOptionsTest, WhatAStoppedServerHasLockedIsFreeBeforeItsLeasesEnd) {
+TEST(PostgresOptionsTest, LocksOfAStoppedServerAreFreeBeforeItsLeasesEnd) {
   // Renewed just before, for the last time.
   EXPECT_LT(PostgresOptions().idle_timeout,
             LeaseOptions().duration - LeaseKeeper::Options().renew_every);
@@ -64,7 +64,7 @@ TEST(PostgresOptionsTest, AHostElsewhereIsAskedForItsCertificateUnlessTheUrlSays
   }
 }
 
-TEST(PostgresOptionsTest, WhatIsNoUrlIsRefusedAndNothingOfItIsTold) {
+TEST(PostgresOptionsTest, RefusesInvalidUrlsWithoutRepeatingThem) {
   for (const char* url :
        {"", "data/folder", "host=db.example password=hush", "http://hush",
         "postgresql://ann:hush@db.example/faces", "postgresql://db.example/faces?password=hush",

@@ -121,7 +121,7 @@ TEST_F(PostgresPoolTest, NobodyWaitsBeyondTheEndOfWaiting) {
   proxy.Thaw();
 }
 
-TEST_F(PostgresPoolTest, WhatACallHasWaitedBeforeIsPartOfItsPatienceWhileTheDatabaseIsAway) {
+TEST_F(PostgresPoolTest, EarlierWaitsCountTowardsPatienceWhileTheDatabaseIsAway) {
   RunOutsideTransaction("DROP DATABASE IF EXISTS away WITH (FORCE)");
   RunOutsideTransaction("CREATE DATABASE away");
   PostgresOptions options = TestDatabaseOptions("away");
@@ -159,7 +159,7 @@ TEST_F(PostgresPoolTest, OfACommitThatIsNotAnsweredNobodyClaimsToKnow) {
   EXPECT_EQ(calls, 1) << "it is not tried again";
 }
 
-TEST_F(PostgresPoolTest, WhoGetsASessionHasItsCommitsAndWhoPeeksDoesNotWaitForThem) {
+TEST_F(PostgresPoolTest, GetWaitsForCommitsAndPeekDoesNot) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.unanswered_timeout = std::chrono::milliseconds(300);
@@ -183,7 +183,7 @@ TEST_F(PostgresPoolTest, WhoGetsASessionHasItsCommitsAndWhoPeeksDoesNotWaitForTh
   EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
 }
 
-TEST_F(PostgresPoolTest, WhatIsDoneOnceWhenItIsDoneTwiceGoesOnWhenItsCommitIsNotAnswered) {
+TEST_F(PostgresPoolTest, RetriesIdempotentWorkWhenItsCommitIsNotAnswered) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.unanswered_timeout = std::chrono::milliseconds(300);
@@ -241,7 +241,7 @@ TEST_F(PostgresPoolTest, ADatabaseThatAcceptsAndSaysNothingKeepsNoServerFromBein
   EXPECT_THAT(PostgresPool::Open(options).status(), StatusIs(Code::kUnavailable));
 }
 
-TEST_F(PostgresPoolTest, WhoFindsAllConnectionsInUseIsToldSoWhenItsTimeIsOver) {
+TEST_F(PostgresPoolTest, ReportsThatAllConnectionsAreInUseWhenTheTimeIsOver) {
   PostgresOptions options = TestDatabaseOptions();
   options.max_connections = 1;
   options.patience = std::chrono::milliseconds(200);
@@ -264,7 +264,7 @@ TEST_F(PostgresPoolTest, WhoFindsAllConnectionsInUseIsToldSoWhenItsTimeIsOver) {
   EXPECT_THAT(pool->Run([](PostgresTransaction&) { return absl::OkStatus(); }), IsOk());
 }
 
-TEST_F(PostgresPoolTest, WhatHasWaitedForTooLongIsNotBegun) {
+TEST_F(PostgresPoolTest, DoesNotBeginWorkAfterItsDeadline) {
   bool called = false;
   EXPECT_THAT(stores_->pool()->Run(
                   [&](PostgresTransaction&) {
@@ -276,7 +276,7 @@ TEST_F(PostgresPoolTest, WhatHasWaitedForTooLongIsNotBegun) {
   EXPECT_FALSE(called);
 }
 
-TEST_F(PostgresPoolTest, WhatOthersLockOrWhatTakesTooLongIsEnded) {
+TEST_F(PostgresPoolTest, EndsStatementsThatAreLockedOrTakeTooLong) {
   PostgresOptions options = TestDatabaseOptions();
   options.lock_timeout = std::chrono::milliseconds(50);
   options.statement_timeout = std::chrono::milliseconds(100);
@@ -313,14 +313,14 @@ struct DatabaseError {
   const char* name;
   const char* sqlstate;
   Code code;
-  const char* told;
+  const char* message;
   int calls;  // of the work: more where another try may do better
 };
 
 class PostgresErrorTest : public PostgresPoolTest,
                           public ::testing::WithParamInterface<DatabaseError> {};
 
-TEST_P(PostgresErrorTest, WhatTheDatabaseSaysIsOneLineWithItsCodeAndWithoutValues) {
+TEST_P(PostgresErrorTest, ErrorsAreOneLineWithTheirCodeAndWithoutValues) {
   const DatabaseError& error = GetParam();
   int calls = 0;
   const absl::Status status = stores_->pool()->Run([&](PostgresTransaction& transaction) {
@@ -331,7 +331,7 @@ TEST_P(PostgresErrorTest, WhatTheDatabaseSaysIsOneLineWithItsCodeAndWithoutValue
   EXPECT_EQ(calls, error.calls);
   EXPECT_EQ(status.code(), error.code) << status;
   EXPECT_THAT(std::string(status.message()),
-              AllOf(HasSubstr(error.told), Not(HasSubstr("hush")), Not(HasSubstr("\n"))));
+              AllOf(HasSubstr(error.message), Not(HasSubstr("hush")), Not(HasSubstr("\n"))));
   if (!status.ok()) {
     EXPECT_THAT(MessageForClients(status),
                 AllOf(Not(IsEmpty()), Not(HasSubstr("postgresql")), Not(HasSubstr("SQLSTATE")),

@@ -76,7 +76,7 @@ class PostgresStoresTest : public ::testing::Test {
   std::unique_ptr<PostgresStores> stores_;
 };
 
-TEST_F(PostgresStoresTest, WhatOneServerKeepsAnotherFinds) {
+TEST_F(PostgresStoresTest, OneServerFindsTheRecordsOfAnother) {
   const auto other = OpenTestStores();
   ASSERT_OK_AND_ASSIGN(const SessionRecord made,
                        CreateSession(stores_->sessions(), SampleSession("s", 1)));
@@ -89,7 +89,7 @@ TEST_F(PostgresStoresTest, WhatOneServerKeepsAnotherFinds) {
   EXPECT_EQ(payload.View().Sha256(), mesh);
 }
 
-TEST_F(PostgresStoresTest, WhatIsKeptIsDatedByTheDatabasesClock) {
+TEST_F(PostgresStoresTest, TheDatabasesClockDatesRecords) {
   const auto set_year = [](const char* year) {
     RunSql(absl::StrCat(
         "CREATE OR REPLACE FUNCTION tissueform_now() RETURNS timestamptz VOLATILE LANGUAGE sql AS "
@@ -137,7 +137,7 @@ struct Damage {
 class PostgresDamageTest : public PostgresStoresTest,
                            public ::testing::WithParamInterface<Damage> {};
 
-TEST_P(PostgresDamageTest, ADamagedBlobIsToldOnceSetAsideAndCanComeAgain) {
+TEST_P(PostgresDamageTest, ADamagedBlobIsReportedOnceSetAsideAndReplaceable) {
   const std::string mesh = PutMesh(1, 100'000);
   const std::string positions = SamplePositions(1, 200'000);
   ASSERT_THAT(
@@ -178,7 +178,7 @@ INSTANTIATE_TEST_SUITE_P(
                "blob_pieces SET number = number - 100 WHERE number > 98;"}),
     [](const auto& of) { return of.param.name; });
 
-TEST_F(PostgresStoresTest, ADamagedRecordIsToldAndLeftOutOfLists) {
+TEST_F(PostgresStoresTest, ADamagedRecordIsReportedAndLeftOutOfLists) {
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("a", 1)), IsOk());
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("b", 2)), IsOk());
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("c", 3)), IsOk());
@@ -274,7 +274,7 @@ TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatThe
   EXPECT_THAT(stores_->meshes().Read(mesh), IsOk());
 }
 
-TEST_F(PostgresStoresTest, AWrongPasswordIsToldAtTheStartWithoutIt) {
+TEST_F(PostgresStoresTest, OpenReportsAWrongPasswordWithoutRepeatingIt) {
   PostgresOptions options = TestDatabaseOptions();
   options.password = "hush-hush";
   EXPECT_THAT(PostgresStores::Open({.database = options}).status(),
@@ -345,7 +345,7 @@ TEST_F(PostgresStoresTest, ADatabaseWithoutTlsIsNotTalkedToWhereTlsIsAskedFor) {
               StatusIs(Code::kUnavailable, AnyOf(HasSubstr("SSL"), HasSubstr("certificate"))));
 }
 
-TEST_F(PostgresStoresTest, OfTwoServersThatWriteTheSameWordsInTheSameSecondOneIsToldSo) {
+TEST_F(PostgresStoresTest, TheSecondOfTwoEqualChangesInOneSecondIsRefusedAsStale) {
   SqlExportStore store(&stores_->database());
   const auto clock = [] { return int64_t{1'800'000'000}; };
   ExportQueue here({}, &store, clock);
