@@ -37,7 +37,7 @@ void UnblockEndingSignals() {
 
 PlanWork PlanWorkOf(BridgeParts* parts, const BridgeOptions& options) {
   PlanWorkOptions work = options.plan;
-  work.tell = [](const std::string& series, absl::string_view stage, double fraction) {
+  work.on_progress = [](const std::string& series, absl::string_view stage, double fraction) {
     absl::FPrintF(stderr, "%s %3.0f %% %s\n", series, 100 * fraction, stage);
   };
   return PlanWork(&parts->queue(), parts->server(), std::move(work));
@@ -59,7 +59,7 @@ void PrintPatient(const QueuedStudy& study, const QueuedExport& queued) {
 
 // Works until the server knows that it is stored. Permanent failures are reported to it, too.
 absl::Status StepToTheEnd(ExportWork* work, QueuedExport* queued) {
-  for (int step = 0; step < kMaxSteps && queued->state != BridgeExportState::kTold; ++step) {
+  for (int step = 0; step < kMaxSteps && queued->state != BridgeExportState::kReported; ++step) {
     const absl::Status status = work->Step(queued);
     if (queued->state == BridgeExportState::kFailed) {
       if (queued->done_s == 0) work->Step(queued).IgnoreError();
@@ -238,8 +238,8 @@ absl::Status BridgeCommands::Store() const {
   ReceivedRows received(&parts->queue());
   absl::StatusOr<QueuedExport> found = exports.Get(name_);
   if (absl::IsNotFound(found.status())) {
-    TF_ASSIGN_OR_RETURN(const v1::Export told, parts->server()->GetExport(name_));
-    TF_RETURN_IF_ERROR(work->Take(told));
+    TF_ASSIGN_OR_RETURN(const v1::Export requested, parts->server()->GetExport(name_));
+    TF_RETURN_IF_ERROR(work->Take(requested));
     found = exports.Get(name_);
   }
   TF_RETURN_IF_ERROR(found.status());

@@ -10,7 +10,7 @@ namespace tissueform {
 enum class BridgeRunKind { kEverything, kReceiving };
 
 // Runs the bridge until SIGTERM or SIGINT, which must be blocked on every thread; the exit code.
-// Prints `receiving on HOST:PORT` and `review page on URL` on stdout when it is ready, and tells
+// Prints `receiving on HOST:PORT` and `review page on URL` on stdout when it is ready, and notifies
 // systemd; logs go to stderr.
 int RunBridge(const BridgeOptions& options, BridgeRunKind kind);
 

@@ -119,7 +119,7 @@ function drag(page: Page, forwardMm: number): Promise<number> {
     const { bench, view } = (globalThis as unknown as Hook).tissueform;
     bench.plan.change(1, { forwardMm: mm }, false);
     // On a machine that is too busy a worker answers, a picture later.
-    for (let i = 0; i < 200 && bench.local.posesSinceTold > 0; ++i) await new Promise((done) => setTimeout(done, 5));
+    for (let i = 0; i < 200 && bench.local.posesSinceShown > 0; ++i) await new Promise((done) => setTimeout(done, 5));
     const { shape } = view.head.skins[0];
     let most = 0;
     for (let i = 0; i < shape.positions.length; i += 3) {
@@ -192,7 +192,7 @@ describe.skipIf(PGPORT === undefined || !hasHaproxy)("a drag in a cluster", () =
   afterAll(() => cluster?.stop());
   afterEach(() => expect([...opened.faults, ...follower.faults]).toEqual([]));
 
-  test("whose server is killed goes on on the other one, after a short word", async () => {
+  test("continues on the other server when its own is killed, after a short message", async () => {
     const { page } = opened;
     const before = await holder(page);
     expect(NODES).toContain(before);
@@ -238,7 +238,7 @@ describe.skipIf(PGPORT === undefined || !hasHaproxy)("a drag in a cluster", () =
     expect((await heard(page)).filter((text) => text !== "live" && text !== "moving")).toEqual([]);
   });
 
-  test("whose gateway is killed goes on through the other one, with the newest pose", async () => {
+  test("continues through the other gateway when its own is killed, with the newest pose", async () => {
     await cluster.nextGateway();
     const { page, faults } = await openCase(opened.page.context(), { url: cluster.url, casePath: cluster.planner.casePath });
     await cluster.nextGateway();

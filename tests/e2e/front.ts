@@ -51,11 +51,11 @@ export class Front {
   async has(count: number, what: "servers" | "gateways"): Promise<void> {
     const end = Date.now() + START_MS;
     const up = new RegExp(`^${what},(?!BACKEND).*,UP,`, "gm");
-    let told = "";
-    while ((told.match(up) ?? []).length !== count) {
-      if (Date.now() > end) throw new Error(`HAProxy does not see ${count} ${what}: ${told}`);
+    let reply = "";
+    while ((reply.match(up) ?? []).length !== count) {
+      if (Date.now() > end) throw new Error(`HAProxy does not see ${count} ${what}: ${reply}`);
       await new Promise((done) => setTimeout(done, ASK_AGAIN_MS));
-      told = await this.ask("show stat");
+      reply = await this.ask("show stat");
     }
   }
 
@@ -69,11 +69,11 @@ export class Front {
   /** "" where it does not answer. */
   private ask(words: string): Promise<string> {
     return new Promise((accept) => {
-      let told = "";
+      let reply = "";
       const connection = connect(this.socket, () => connection.write(`${words}\n`));
-      connection.on("data", (data) => (told += data.toString()));
+      connection.on("data", (data) => (reply += data.toString()));
       connection.on("error", () => accept(""));
-      connection.on("close", () => accept(told));
+      connection.on("close", () => accept(reply));
     });
   }
 }

@@ -57,11 +57,11 @@ test("a move that a dead connection swallows is waited for, sent again, and kept
   await page.waitForFunction(() => (globalThis as any).heard.some(([kind]: [string]) => kind === "live"));
   await isKept(page);
   expect(await keptForwardMm((await state(page)).session)).toBeCloseTo(7, 6);
-  const told = await heard(page);
-  expect(told.map(([kind]) => kind)).toEqual(["waiting", "broken", "live"]);
+  const states = await heard(page);
+  expect(states.map(([kind]) => kind)).toEqual(["waiting", "broken", "live"]);
   // By the page's clock, which a busy machine does not hurry.
-  expect(told[0][1]).toBeGreaterThan(1000);
-  expect(told[1][1]).toBeGreaterThan(told[0][1] + 4000);
+  expect(states[0][1]).toBeGreaterThan(1000);
+  expect(states[1][1]).toBeGreaterThan(states[0][1] + 4000);
 });
 
 test("while the hand rests the page finds out, too", async () => {
@@ -72,7 +72,7 @@ test("while the hand rests the page finds out, too", async () => {
   expect((await heard(page)).map(([kind]) => kind)).toEqual(["waiting", "broken", "live"]);
 });
 
-test("who follows sees no stale picture as a live one, and the next move", async () => {
+test("a follower does not see a stale picture as a live one, and sees the next move", async () => {
   const { session } = await state(opened.page);
   const link = opened.page.url().replace("#case=", `#follow=${session.replace("sessions/", "")}&case=`);
   const { page, faults } = await openPage(await planner.browse(), link);
@@ -103,18 +103,18 @@ test("a case that comes over 1.5 Mbit/s says all the time how far it is", async 
   const context = await planner.browse();
   // What the page shows below the bar, as it changes.
   await context.addInitScript(() => {
-    const told: string[] = ((globalThis as any).told = []);
+    const shown: string[] = ((globalThis as any).shown = []);
     const look = () => {
       const text = document.querySelector(".sheet .told")?.textContent ?? "";
-      if (text !== told[told.length - 1]) told.push(text);
+      if (text !== shown[shown.length - 1]) shown.push(text);
     };
     new MutationObserver(look).observe(document, { subtree: true, childList: true, characterData: true });
   });
   const { hash } = new URL(opened.page.url());
   const { page, faults } = await openPage(context, `${narrow.url}/${hash}`);
   await page.locator(".planner header").waitFor();
-  const told: string[] = await page.evaluate(() => (globalThis as any).told);
-  const steps = told.flatMap((text) => /^(\d+\.\d) of (\d+\.\d) MB, (\d+) %$/.exec(text)?.slice(1).map(Number) ?? []);
+  const shown: string[] = await page.evaluate(() => (globalThis as any).shown);
+  const steps = shown.flatMap((text) => /^(\d+\.\d) of (\d+\.\d) MB, (\d+) %$/.exec(text)?.slice(1).map(Number) ?? []);
   const [megabytes, totals, percents] = [0, 1, 2].map((k) => steps.filter((_, i) => i % 3 === k));
   expect(new Set(totals).size).toBe(1);
   // In steps of 128 KiB, some of which come together.

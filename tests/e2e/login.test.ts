@@ -51,7 +51,7 @@ async function plannerOf(name: string, before: (page: Page) => void = () => {}) 
 
 const kept = (page: Page) => page.evaluate(() => JSON.stringify([{ ...localStorage }, { ...sessionStorage }]));
 
-test("who signs in plans under their name, and the token lies in no storage", async () => {
+test("a user who signs in plans under their name, and the token is not in any storage", async () => {
   const { page, faults } = await plannerOf("ada");
   const caseId = /#case=([0-9a-f]{64})$/.exec(page.url())?.[1];
   expect(page.url()).toBe(`${planner.url}/#case=${caseId}`);
@@ -73,26 +73,26 @@ test("who signs in plans under their name, and the token lies in no storage", as
   expect(faults).toEqual([]);
 });
 
-test("a drag outlives its tokens: it is told every new one, and the server accepts at most it", async () => {
+test("a drag outlives its tokens: it receives every new one, and the server accepts only that", async () => {
   provider.tokenSeconds = 3;
-  const tokensTold: number[] = [];
+  const tokensSent: number[] = [];
   const { page, faults } = await plannerOf("bea", (early) => {
     early.on("websocket", (socket) => {
-      const at = tokensTold.push(0) - 1;
-      socket.on("framesent", ({ payload }) => (tokensTold[at] += payload.toString().includes("eyJ") ? 1 : 0));
+      const at = tokensSent.push(0) - 1;
+      socket.on("framesent", ({ payload }) => (tokensSent[at] += payload.toString().includes("eyJ") ? 1 : 0));
     });
   });
-  const before = tokensTold.length;
-  const first = tokensTold[before - 1];
+  const before = tokensSent.length;
+  const first = tokensSent[before - 1];
   await takeSegment(page, "Lower jaw");
   for (let mm = 1; mm <= 2; ++mm) {
-    await expect.poll(() => tokensTold[before - 1], { timeout: 20_000, interval: 50 }).toBeGreaterThanOrEqual(first + mm);
+    await expect.poll(() => tokensSent[before - 1], { timeout: 20_000, interval: 50 }).toBeGreaterThanOrEqual(first + mm);
     await typeMove(page, "Forward", String(mm));
     await moved(page, 0.6 * mm, 1.4 * mm);
   }
   // A token that is not good would have ended the drag; no other one was begun.
   expect((await state(page)).connection).toBe("live");
-  expect(tokensTold.length).toBe(before);
+  expect(tokensSent.length).toBe(before);
   expect(faults).toEqual([]);
 });
 
@@ -108,7 +108,7 @@ test("without a token the server answers nobody", async () => {
   expect(status).toBe("16");
 });
 
-test("who signs out is out, here and at the provider", async () => {
+test("a user who signs out is out, here and at the provider", async () => {
   const { page, faults } = await plannerOf("cleo");
   await page.getByRole("button", { name: "Sign out" }).click();
   await page.getByRole("button", { name: /yes/i }).click();
@@ -143,7 +143,7 @@ test("an answer with another state lets nobody in", async () => {
   expect(page.url()).toBe(`${planner.url}/`);
 });
 
-test("a provider that is down is told, and asked again", async () => {
+test("a provider that is down is reported, and asked again", async () => {
   await provider.stop();
   const { page } = await open(await planner.browse());
   await page.getByRole("alert").getByText("does not answer. Try again in a moment.").waitFor();

@@ -35,9 +35,9 @@ test("pose sent to positions and normals in the geometry buffers, memory and pau
 
 test.each(["gradient_field", "linear_elastic", "neo_hookean"])("pose to positions and normals by the page itself: %s", async (name) => {
   const { page } = await openCase(await planner.browse(), planner);
-  const told = await page.evaluate(chooseOwnAnswers, name);
+  const chosen = await page.evaluate(chooseOwnAnswers, name);
   const result = await page.evaluate(drag, SECONDS);
-  console.log(JSON.stringify({ model: name, ...told, ...result }, null, 1));
+  console.log(JSON.stringify({ model: name, ...chosen, ...result }, null, 1));
 }, 1000 * SECONDS + 120_000);
 
 test("from a target to the bone that gives it, while one pulls", async () => {

@@ -36,7 +36,7 @@ describe("the hand-made face", () => {
   });
   afterEach(() => expect(opened.faults).toEqual([]));
 
-  test("tells which landmarks are missing, and all its measures once suggestions are confirmed", async () => {
+  test("reports which landmarks are missing, and all its measures once suggestions are confirmed", async () => {
     const { page } = opened;
     await open(page, "Measures");
     await page.getByText("needs Nose tip, Upper lip, Soft pogonion").waitFor();
@@ -158,7 +158,7 @@ async function pullForward(page: Page, pixels: number): Promise<void> {
 }
 
 describe("the bundled head", () => {
-  test("is pulled to a targeted chin, told what cannot be reached, and takes the bone as one step", async () => {
+  test("is pulled to a targeted chin, reports what cannot be reached, and takes the bone as one step", async () => {
     const { page, faults } = await openCase(await planner.browse(), planner);
     await open(page, "Soft-tissue targets");
     await page.getByLabel("or a place").selectOption({ label: "Chin" });

@@ -140,7 +140,7 @@ function largestMovementMm(poses: number[][]): number {
 }
 
 /** Said, not judged: a loaded machine is no reason to fail. */
-function tellOpening(browserName: string, beginMs: number): void {
+function printOpening(browserName: string, beginMs: number): void {
   console.log(`in ${browserName} the file moves ${(performance.now() - beginMs).toFixed(0)} ms after opening (wanted: 2000)`);
 }
 
@@ -157,7 +157,7 @@ describe("in Chromium", () => {
     const begin = performance.now();
     const { page, requests, errors } = await openPage("face.html");
     await answered(page as Opened);
-    tellOpening("Chromium", begin);
+    printOpening("Chromium", begin);
     expect(hasNotice((await page.locator("#notice").textContent()) ?? "")).toBe(true);
     expect(await page.evaluate(() => (globalThis as unknown as Hook).tissueform?.moving.isInWorker)).toBe(true);
     expect(await page.getByText("moves more slowly").count()).toBe(0);
@@ -375,7 +375,7 @@ describe.skipIf(noFirefox !== "")("in Firefox", () => {
     const begin = performance.now();
     const { page, requests } = await openInFirefox("face.html");
     await answered(page as unknown as Opened);
-    tellOpening("Firefox", begin);
+    printOpening("Firefox", begin);
     const state = await page.evaluate(() => {
       const head = (globalThis as unknown as Hook).tissueform?.moving;
       return [head.isInWorker, head.view.stage.hasRenderer, document.getElementById("notice")?.textContent];

@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { type CaseFile, openCase } from "../../client/web/src/case/case_file";
-import { type ToldPlan, exportedSurfaces, planDocument } from "../../client/web/src/exports/plan_export";
+import { type ExportedPlan, exportedSurfaces, planDocument } from "../../client/web/src/exports/plan_export";
 import { ProfileDrawing } from "../../client/web/src/exports/profile_svg";
 import type { Prediction } from "../../client/web/src/generated/tissueform/v1/prediction_pb";
 import { DeformationModel } from "../../client/web/src/generated/tissueform/v1/session_pb";
@@ -87,13 +87,13 @@ function measuredLandmarks(file: CaseFile): LandmarkBook {
 }
 
 /** The head as the planner draws it, and the face as its panels and exports are given it. */
-function pageOf(file: CaseFile, landmarks: LandmarkBook, plan: Plan, { displacements }: Reference): { head: Head; face: ToldPlan; largestMm: number } {
+function pageOf(file: CaseFile, landmarks: LandmarkBook, plan: Plan, { displacements }: Reference): { head: Head; face: ExportedPlan; largestMm: number } {
   const head = new Head(file);
   const followed = pick(displacements, file.followed);
   const shownPoses = new Map(plan.handles.map(({ name }, index) => [name, plan.poses()[index]]));
   head.setDisplacements(followed);
   head.setPoses(shownPoses);
-  const face: ToldPlan = {
+  const face: ExportedPlan = {
     file, landmarks, plan, shownPoses,
     positionsOf: (surface: number) => head.surfaces[surface].shape.positions,
     bandOf: () => null,
@@ -129,9 +129,9 @@ function largestDifference(a: ArrayLike<number>, b: ArrayLike<number>): number {
   return largest;
 }
 
-function expectMovement(told: Record<string, unknown>, expected: Movement): void {
+function expectMovement(actual: Record<string, unknown>, expected: Movement): void {
   for (const [component, value] of Object.entries(expected)) {
-    if (typeof value === "number") expect(Math.abs((told[component] as number) - value), `${expected.name} ${component}`).toBeLessThan(MOST_OFF);
+    if (typeof value === "number") expect(Math.abs((actual[component] as number) - value), `${expected.name} ${component}`).toBeLessThan(MOST_OFF);
   }
 }
 

@@ -48,7 +48,7 @@ describe("a planner", () => {
     await moved(page, 6, 10);
   });
 
-  test("tells what is no number, and what is beyond the limits", async () => {
+  test("reports text that is not a number, and values beyond the limits", async () => {
     const { page } = opened;
     await typeMove(page, "Up", "a lot");
     await page.getByText("enter a number in millimeters").waitFor();
@@ -186,7 +186,7 @@ describe("a planner", () => {
 });
 
 describe("a whole head", () => {
-  test("has fixed bone, teeth that go along, and landmarks that tell how far", async () => {
+  test("has fixed bone, teeth that go along, and landmarks that show how far", async () => {
     const { page, faults } = await openCase(await planner.browse(), planner, planner.packWholeHead());
     await takeSegment(page, "Lower jaw");
     await typeMove(page, "Forward", "8");
@@ -281,7 +281,7 @@ describe("bad input", () => {
     expect(faults).toEqual([]);
   });
 
-  test("a case that the server does not have is told, with a way back", async () => {
+  test("a case that the server does not have is reported, with a way back", async () => {
     const { page } = await openPage(await planner.browse(), `${planner.url}/#case=${"0".repeat(64)}`);
     await page.getByText("The case cannot be opened").waitFor();
     await page.getByRole("button", { name: "Cases" }).click();

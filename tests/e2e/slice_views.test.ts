@@ -12,7 +12,7 @@ let pages: SourcePages;
 beforeAll(async () => (pages = await SourcePages.start()));
 afterAll(() => pages.stop());
 
-type Hook = { views: any; told: any[][] };
+type Hook = { views: any; reported: any[][] };
 
 async function openSlices(options: BrowserContextOptions = {}): Promise<Page> {
   const page = await pages.open("tests/slices/slices_page.html", { viewport: { width: 1280, height: 800 }, ...options });
@@ -38,7 +38,7 @@ async function fill(page: Page): Promise<void> {
 
 const frames = (page: Page) => page.evaluate(() => new Promise<void>((done) => requestAnimationFrame(() => requestAnimationFrame(() => done()))));
 const surface = (page: Page, plane: string) => page.locator(`[data-plane=${plane}] .slice-surface`);
-const last = (page: Page, kind: string) => page.evaluate((name) => (globalThis as unknown as Hook).told.filter(([what]) => what === name).at(-1), kind);
+const last = (page: Page, kind: string) => page.evaluate((name) => (globalThis as unknown as Hook).reported.filter(([what]) => what === name).at(-1), kind);
 
 /** Where a point of LPS is on the page. */
 async function placeOf(page: Page, plane: string, [x, y]: [number, number]): Promise<[number, number]> {
@@ -50,7 +50,7 @@ async function placeOf(page: Page, plane: string, [x, y]: [number, number]): Pro
   return [box.x + box.width / 2 + x / pixelMm, box.y + box.height / 2 + y / pixelMm];
 }
 
-test.each(["axial", "coronal", "sagittal"])("what is at the left, anterior and superior is where the letters of the %s slice say", async (plane) => {
+test.each(["axial", "coronal", "sagittal"])("left, anterior and superior are where the letters of the %s slice say", async (plane) => {
   const page = await openSlices();
   await fill(page);
   // The block's middle.

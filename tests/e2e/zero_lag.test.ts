@@ -100,7 +100,7 @@ function dragForward(page: Page, frames: number): Promise<{ frames: DragFrame[];
 
 /** Until the page itself has answered the newest poses, those of a drag. */
 async function followedByPage(page: Page): Promise<void> {
-  await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.local.posesSinceTold === 0);
+  await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.local.posesSinceShown === 0);
   await moved(page, 3, 9);
 }
 
@@ -137,13 +137,13 @@ describe("on a line with delay", () => {
       // Both are taken as they come, whichever comes first.
       const once = (owner: any, name: string, wanted: (answer: any) => boolean) =>
         new Promise<number[]>((done) => {
-          const told = owner[name];
+          const original = owner[name];
           owner[name] = (...words: unknown[]) => {
-            told(...words);
+            original(...words);
             if (wanted(words[0])) done(Array.from(bench.newest.displacements as Float32Array));
           };
         });
-      const sent = () => bench.local.posesSinceTold === 0;
+      const sent = () => bench.local.posesSinceShown === 0;
       const mine = once(bench.local.listener, "onEvaluation", sent);
       bench.plan.change(1, { forwardMm: 5, pitchDeg: 2 }, true);
       const theirs = once(bench.live.listener, "onPicture", (picture) => picture.posesBehind === 0 && picture.frame.refinement === 0);
@@ -180,7 +180,7 @@ describe("on a line with delay", () => {
     await ready(page);
   });
 
-  test("who stops it has the server answer, and may start it again", async () => {
+  test("after a stop the server answers, and local answers can start again", async () => {
     const { page } = opened;
     await page.getByRole("button", { name: "Stop", exact: true }).click();
     await page.evaluate(() => (globalThis as unknown as Hook).tissueform.bench.plan.change(1, { forwardMm: 1 }, true));

@@ -46,7 +46,7 @@ double FiniteNumber(ByteSource* source) {  // as ReadDicomHeader lets through
   return std::isfinite(number) ? number : 0;
 }
 
-// What tells scans, series and frames apart; torn apart in any way.
+// What distinguishes scans, series and frames; torn apart in any way.
 void TakeOrigin(ByteSource* source, DicomHeader* header) {
   const auto name = [source] { return std::string(1, source->Take<char>()); };
   header->series_uid += name();

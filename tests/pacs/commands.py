@@ -5,7 +5,7 @@
 
   commands.py PROGRAMS FOLDER
 
-Fetches a study by C-GET, C-MOVE and WADO-RS, looks at what came, builds, publishes and stores it, and tells where everything is;
+Fetches a study by C-GET, C-MOVE and WADO-RS, looks at what came, builds, publishes and stores it, and reports where everything is;
 then the same study goes through dcmqrscp, by our C-STORE, C-GET and C-MOVE, and by movescu to `listen`. Prints a line for each
 check; exit code 1 when one fails, 77 when a program of others is missing.
 """
@@ -97,10 +97,10 @@ def check_fetched(way, bridge, study, ct_folder):
 
 
 def check_series(bridge):
-    told = bridge.run("series")
-    check("series says why one was chosen", told.returncode == 0 and re.search(r"chosen.*93 axial slices", told.stdout, re.DOTALL) is not None,
-          told.stdout + told.stderr)
-    check("series names nobody", names_nobody(told.stdout))
+    listed = bridge.run("series")
+    check("series says why one was chosen", listed.returncode == 0 and re.search(r"chosen.*93 axial slices", listed.stdout, re.DOTALL) is not None,
+          listed.stdout + listed.stderr)
+    check("series names nobody", names_nobody(listed.stdout))
 
 
 def check_refused(what, end, words):
@@ -109,7 +109,7 @@ def check_refused(what, end, words):
 
 
 def check_wrong_options(programs, options):
-    """Told at the start, and not when the first head has come."""
+    """Wrong options are reported at the start, and not when the first head has come."""
     broken, at = programs.folder / "broken.json", options.index("--recipe") + 1
     broken.write_text('{"format": ')
     for what, recipe, words in (("a recipe that is a folder", programs.folder, "recipe"), ("a recipe that is no JSON", broken, "broken.json: not valid JSON at line 1")):
@@ -137,8 +137,8 @@ def check_way_to_the_server(programs, bridge):
 def check_store(programs, bridge, case, count):
     """From a prediction to objects in the PACS, which `count` counts."""
     before = count()
-    told = programs.tissueform("prediction", "send", programs.predict(case))
-    export = re.search(r"exports/[\w-]+", told.stdout).group(0)
+    sent = programs.tissueform("prediction", "send", programs.predict(case))
+    export = re.search(r"exports/[\w-]+", sent.stdout).group(0)
     check_refused("storing what nobody has asked for", bridge.run("store", "exports/unknown"), "unknown")
     shown = bridge.run("store", export)
     check("store shows whose it is", shown.returncode == 0 and "Planted" in shown.stdout and "PLANTED-4711" in shown.stdout, shown.stdout + shown.stderr)
@@ -155,8 +155,8 @@ def check_store(programs, bridge, case, count):
 
 def check_merged(programs, bridge, case, study):
     """A patient who is merged into another one after a person has looked."""
-    told = programs.tissueform("prediction", "send", programs.predict(case, title="Before the merge"))
-    export = re.search(r"exports/[\w-]+", told.stdout).group(0)
+    sent = programs.tissueform("prediction", "send", programs.predict(case, title="Before the merge"))
+    export = re.search(r"exports/[\w-]+", sent.stdout).group(0)
     bridge.run("store", export)
     name, = programs.orthanc("/tools/find", {"Level": "Patient", "Query": {"PatientID": PATIENT["patient_id"]}})
     programs.orthanc(f"/patients/{name}/modify", {"Replace": {"PatientID": "MERGED-1"}, "Force": True, "KeepSource": False,

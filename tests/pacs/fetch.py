@@ -56,9 +56,9 @@ def fetch(programs, study, state):
     options = programs.bridge_options()[2:]
     command = [programs.bridge_program, "fetch", study, *options, "--state-dir", folder]
     end = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=stack.PATIENCE_S, check=False)
-    told = subprocess.run([programs.bridge_program, "status", "--json", "--state-dir", folder], capture_output=True, text=True,
+    status = subprocess.run([programs.bridge_program, "status", "--json", "--state-dir", folder], capture_output=True, text=True,
                           timeout=stack.PATIENCE_S, check=True)
-    return end, [(series["state"], series["images"], series["reason"]) for series in json.loads(told.stdout)["series"]]
+    return end, [(series["state"], series["images"], series["reason"]) for series in json.loads(status.stdout)["series"]]
 
 
 def states(found):

@@ -72,8 +72,8 @@ def wait_for_cases(programs, count):
 
 def send(programs, prediction):
     """Somebody wants it in the PACS, once more where it is there already: the export's name."""
-    told = programs.tissueform("prediction", "send", prediction)
-    return re.search(r"exports/[\w-]+", told.stdout).group(0)
+    sent = programs.tissueform("prediction", "send", prediction)
+    return re.search(r"exports/[\w-]+", sent.stdout).group(0)
 
 
 def confirm(programs, export, looks=False):
@@ -242,10 +242,10 @@ def check_deleted_study(programs, studies, case):
     notes = [entry["note"] for entry in programs.bridge_status()["exports"] if entry["name"] == export]
     check("of a study that was deleted nothing is stored, and the bridge says so", len(notes) == 1 and "no longer has the series of this case" in notes[0], str(notes))
 
-    def told():
+    def is_failed():
         lines = [line for line in programs.tissueform("prediction", "sent").stdout.splitlines() if line.startswith(export)]
         return lines and " failed " in lines[0]
-    check("and whoever asked for it hears of it", programs.wait_for("the server hears of it", told))
+    check("and whoever asked for it hears of it", programs.wait_for("the server hears of it", is_failed))
     check("the study does not come again", not any(programs.instances_of(study) for study in studies))
 
 

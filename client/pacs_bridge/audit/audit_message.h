@@ -48,7 +48,7 @@ struct AuditEvent {
   Kind kind = Kind::kApplicationStart;
   absl::Time time = {};
   absl::Status outcome = {};
-  std::string source = {};  // which bridge tells it
+  std::string source = {};  // the bridge that reports it
   std::vector<AuditParticipant> participants = {};
   std::optional<AuditedStudy> study = {};
   std::string query = {};  // the identifier of a C-FIND, explicit VR little endian

@@ -14,7 +14,7 @@
 
 namespace tissueform {
 
-// The audit of one process of the bridge: tells its start and its end itself. Thread-safe.
+// The audit of one process of the bridge. It records its own start and end. Thread-safe.
 class BridgeAudit {
  public:
   // Errors: those of AuditLog::Reserve.

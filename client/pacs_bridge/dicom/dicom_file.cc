@@ -81,8 +81,8 @@ void RemovePrivateAndDrawn(DcmItem* item) {
   }
 }
 
-// Keeps what the disk says of what is written. DCMTK's own stream does not tell of a disk that is
-// full, and of a small file it writes nothing before it closes it, without looking.
+// Keeps the errors of writing to the disk. DCMTK's own stream does not report a full disk: it
+// writes a small file only when it closes it, and ignores the result.
 class FileConsumer final : public DcmConsumer {
  public:
   explicit FileConsumer(const std::string& path)

@@ -71,15 +71,16 @@ std::string NamesOf(DcmItem* dataset) {
 
 DicomTexts::DicomTexts(DcmItem* dataset) : dataset_(dataset), set_(NamesOf(dataset)) {}
 
-void DicomTexts::Tell(absl::string_view what) {
+void DicomTexts::ReportProblem(absl::string_view what) {
   if (problem_.empty()) problem_ = std::string(what);
 }
 
 std::string DicomTexts::ToUtf8(const DcmTagKey& tag, const std::string& raw, bool is_name) {
   if (IsAscii(raw)) return raw;
   if (std::optional<std::string> text = set_.ToUtf8(raw, is_name)) return *std::move(text);
-  Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is not in the character set that ",
-                    "SpecificCharacterSet (0008,0005) names, or that set is unknown"));
+  ReportProblem(absl::StrCat("the attribute ", tag.toString().c_str(),
+                             " is not in the character set that ",
+                             "SpecificCharacterSet (0008,0005) names, or that set is unknown"));
   return OnlyAscii(raw);
 }
 
@@ -97,8 +98,8 @@ std::string DicomTexts::Get(const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   if (dataset_->findAndGetElement(tag, element).bad() || element == nullptr) return {};
   if (element->getLength() > kMaxRawBytes) {
-    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " has more than ", kMaxRawBytes,
-                      " bytes and is not read"));
+    ReportProblem(absl::StrCat("the attribute ", tag.toString().c_str(), " has more than ",
+                               kMaxRawBytes, " bytes and is not read"));
     return {};
   }
   std::string raw = RawText(element);
@@ -108,8 +109,8 @@ std::string DicomTexts::Get(const DcmTagKey& tag) {
   std::string text = Tidy(ToUtf8(tag, raw, is_name));
   if (text.size() > kMaxBytes) CutUtf8(kMaxBytes, &text);
   if (long_before || text.size() + 3 >= kMaxBytes) {
-    Tell(absl::StrCat("the attribute ", tag.toString().c_str(), " is longer than ", kMaxBytes,
-                      " bytes and is cut"));
+    ReportProblem(absl::StrCat("the attribute ", tag.toString().c_str(), " is longer than ",
+                               kMaxBytes, " bytes and is cut"));
   }
   return text;
 }

@@ -37,7 +37,7 @@ class DicomTexts {
  private:
   void CutRaw(bool is_name, std::string* raw) const;
   std::string ToUtf8(const DcmTagKey& tag, const std::string& raw, bool is_name);
-  void Tell(absl::string_view what);
+  void ReportProblem(absl::string_view what);
 
   DcmItem* const dataset_;
   const CharacterSet set_;

@@ -228,15 +228,15 @@ class DicomWebClient : public PacsClient {
 
   // Answers of STOW-RS differ from PACS to PACS, and our copy is deleted by what they say: so what
   // the PACS finds when it is asked counts, where it answers queries.
-  absl::Status Confirmed(const absl::Status& told, const InstanceHeader& header) {
+  absl::Status Confirmed(const absl::Status& reported, const InstanceHeader& header) {
     const absl::StatusOr<bool> there =
         Has(header.study_uid, header.series_uid, header.instance_uid);
     if (absl::IsUnimplemented(there.status()) || absl::IsFailedPrecondition(there.status())) {
-      return told;
+      return reported;
     }
-    if (!there.ok()) return told.ok() ? there.status() : told;
+    if (!there.ok()) return reported.ok() ? there.status() : reported;
     if (*there) return absl::OkStatus();
-    if (!told.ok()) return told;
+    if (!reported.ok()) return reported;
     return absl::UnavailableError(
         absl::StrCat("the PACS '", peer_.name, "' says that it has the object ",
                      header.instance_uid, " and does not find it: tried again"));

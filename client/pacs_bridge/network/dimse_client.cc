@@ -234,7 +234,7 @@ class DimseClient : public PacsClient {
     return GetByDimse(peer_.name, association.get(), query, seconds_, announced, folder, sink);
   }
 
-  // A CT image where the PACS tells of one, otherwise any.
+  // A CT image where the PACS names one, otherwise any.
   absl::StatusOr<std::string> SourceInstance(const std::string& study_uid,
                                              const std::string& series_uid) {
     TF_ASSIGN_OR_RETURN(const auto association, Associate(FindContexts()));

@@ -95,7 +95,7 @@ class GetSession {
   absl::StatusOr<FetchCounts> End(const T_DIMSE_C_GetRSP& answer) {
     counts_.failed = std::max(counts_.failed, int{answer.NumberOfFailedSubOperations});
     if (counts_.completed > 0 || counts_.failed > 0) {
-      // A full disk is ours to tell: trying again at once would not help.
+      // A full disk is our own error to report: trying again at once would not help.
       if (counts_.completed == 0 && !first_problem_.ok()) return first_problem_;
       return counts_;
     }

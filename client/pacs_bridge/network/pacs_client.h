@@ -47,7 +47,7 @@ struct SeriesQuery {  // one of them
   std::string accession_number = {};
 };
 
-// One series as the PACS tells it; empty where it says nothing. Texts are UTF-8.
+// One series as the PACS reports it; empty where it says nothing. Texts are UTF-8.
 struct SeriesSummary {
   std::string study_uid = {};
   std::string series_uid = {};
@@ -56,15 +56,15 @@ struct SeriesSummary {
   std::string study_date = {};
   std::string patient_id = {};
   int number = 0;
-  int instances = 0;  // 0: not told
+  int instances = 0;  // 0: not reported
 };
 
-// Whose a study is, as the PACS tells it. Texts are UTF-8.
+// Whose a study is, as the PACS reports it. Texts are UTF-8.
 struct PatientSummary {
   std::string name = {};
   std::string id = {};
-  std::string issuer = {};      // of the ID; empty: not told, or none
-  std::string birth_date = {};  // YYYYMMDD; empty: not told, or none
+  std::string issuer = {};      // of the ID; empty: not reported, or none
+  std::string birth_date = {};  // YYYYMMDD; empty: not reported, or none
   bool readable = true;         // false: in a character set that is not known
 };
 
@@ -102,7 +102,7 @@ class PacsClient {
                                                   const std::string& series_uid,
                                                   InstanceFolder* folder, InstanceSink* sink) = 0;
 
-  // The header of one object of a series, of a CT image where the PACS tells of one, without
+  // The header of one object of a series, of a CT image where the PACS names one, without
   // pixels, as a new file (0600). Errors: also NotFound.
   virtual absl::Status FetchHeader(const std::string& study_uid, const std::string& series_uid,
                                    const std::string& path) = 0;

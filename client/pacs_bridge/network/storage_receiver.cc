@@ -28,7 +28,7 @@ namespace tissueform {
 namespace {
 
 // Connections beyond max_associations that receive a refusal; more are closed without an answer.
-constexpr int kTold = 16;
+constexpr int kMaxRefusalReplies = 16;
 
 absl::Status CheckOptions(const ReceiverOptions& options) {
   if (options.max_associations < 1) {
@@ -89,7 +89,7 @@ class Receiver : public StorageReceiver {
   void Admit(const ListeningSocket::Connection& taken) {
     const int64_t open = open_;
     const bool is_known = addresses_.Contains(taken.address);
-    if (!is_known || open >= options_.max_associations + kTold) {
+    if (!is_known || open >= options_.max_associations + kMaxRefusalReplies) {
       ++refused_;
       close(taken.socket);
       context_.sink->ConnectionRefused(

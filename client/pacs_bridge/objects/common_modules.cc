@@ -149,7 +149,7 @@ absl::Status WriteCommonModules(DcmDataset* source, const PredictionObjectsInput
     writer.Text(DCM_PositionReferenceIndicator, ValueOf(source, DCM_PositionReferenceIndicator));
   }
   WriteEquipment(input, &writer);
-  // A report tells its evidence instead.
+  // A report names its evidence instead.
   if (identity.modality != "SR") WriteReferencedSeries(input, &writer);
   WriteCodingScheme(&writer);
   return writer.status();

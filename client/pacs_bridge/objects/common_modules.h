@@ -14,7 +14,7 @@ class DcmDataset;
 
 namespace tissueform {
 
-// What tells one object from the others of a prediction.
+// What distinguishes one object from the others of a prediction.
 struct ObjectIdentity {
   std::string key = {};  // of ObjectKeys
   absl::string_view class_uid = {};

@@ -21,7 +21,7 @@ struct QueuedDraft {
   int64_t images = 0;       // of the series when it was sent
 };
 
-// The drafts that were sent, until the server tells no more of them. Its queue must outlive it.
+// The drafts that were sent, until the server no longer reports them. Its queue must outlive it.
 // Thread-safe.
 class DraftRows {
  public:

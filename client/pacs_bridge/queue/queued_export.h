@@ -19,7 +19,7 @@ enum class BridgeExportState {
   kFetched,    // the patient's header is there, and says what the person has seen
   kWritten,    // all objects lie in its folder
   kSent,       // the PACS has them all
-  kTold,       // and the server knows
+  kReported,   // and the server knows
   kFailed,     // cannot be done, which the server knows
 };
 const char* BridgeExportStateName(BridgeExportState state);

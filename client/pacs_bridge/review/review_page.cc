@@ -54,7 +54,7 @@ const char* WordsOf(BridgeExportState state) {
     case BridgeExportState::kWritten:
       return "is being stored";
     case BridgeExportState::kSent:
-    case BridgeExportState::kTold:
+    case BridgeExportState::kReported:
       return "stored";
     case BridgeExportState::kFailed:
       return "failed";

@@ -49,7 +49,7 @@ absl::StatusOr<ReviewQueue> ReadReviewQueue(BridgeQueue* queue) {
   }
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedExport> asked, exports.List());
   for (const QueuedExport& queued : asked) {
-    if (queued.state == BridgeExportState::kTold || list.exports.size() >= kMaxReviewRows) {
+    if (queued.state == BridgeExportState::kReported || list.exports.size() >= kMaxReviewRows) {
       continue;
     }
     // Also of an earlier case of its series.

@@ -20,7 +20,7 @@ constexpr std::chrono::milliseconds kStepPause{1000};
 constexpr std::chrono::hours kDeletionPause{1};
 // A person waits for the case of a draft in the planner, which asks nothing of the bridge.
 constexpr std::chrono::seconds kDraftsPause{5};
-// Whether exports that wait were taken back, which no watch tells.
+// Whether exports that wait were taken back, which no watch reports.
 constexpr std::chrono::minutes kLookPause{5};
 // Exports that a server may report before they are taken; the next watch reports each again.
 constexpr size_t kMaxHeard = 4096;
@@ -47,7 +47,7 @@ bool HasExportStep(const QueuedExport& queued) {
     case BridgeExportState::kFailed:
       return queued.done_s == 0;
     case BridgeExportState::kAsked:
-    case BridgeExportState::kTold:
+    case BridgeExportState::kReported:
       return false;
   }
   return false;
@@ -76,7 +76,7 @@ BridgeService::BridgeService(BridgeServiceParts parts)
   }
 }
 
-void BridgeService::Tell(const absl::Status& status, const std::string& line) {
+void BridgeService::Log(const absl::Status& status, const std::string& line) {
   if (!parts_.log) return;
   parts_.log(!status.ok(), status.ok() ? line : absl::StrCat(line, ": ", status.message()));
 }
@@ -84,14 +84,14 @@ void BridgeService::Tell(const absl::Status& status, const std::string& line) {
 void BridgeService::TakeIn() {
   const absl::StatusOr<std::vector<std::string>> changed = parts_.intake->Settle();
   if (!changed.ok()) {
-    Tell(changed.status(), "received objects cannot be queued");
+    Log(changed.status(), "received objects cannot be queued");
   } else if (!changed->empty()) {
     ReceivedRows rows(parts_.queue);
     for (const std::string& key : *changed) {
       const absl::StatusOr<QueuedSeries> series = rows.Get(key);
       if (!series.ok()) continue;
-      Tell(absl::OkStatus(), absl::StrCat("series ", key, " is ", SeriesStateName(series->state),
-                                          series->reason.empty() ? "" : ": ", series->reason));
+      Log(absl::OkStatus(), absl::StrCat("series ", key, " is ", SeriesStateName(series->state),
+                                         series->reason.empty() ? "" : ": ", series->reason));
     }
     Wake();
   }
@@ -101,7 +101,7 @@ void BridgeService::TakeIn() {
   threads_.BeginStep(kIntake);
   const absl::StatusOr<int> deleted = DeleteOld(parts_.queue, parts_.retention, std::time(nullptr));
   if (!deleted.ok() || *deleted > 0) {
-    Tell(deleted.status(), "deleted expired data");
+    Log(deleted.status(), "deleted expired data");
   }
 }
 
@@ -113,15 +113,15 @@ void BridgeService::FollowDrafts() {
   const absl::StatusOr<std::vector<std::string>> changed = parts_.plans->FollowDrafts();
   if (!changed.ok()) {
     plan_retries_.Failed(kDrafts);
-    return Tell(changed.status(), "the server cannot be asked for its drafts");
+    return Log(changed.status(), "the server cannot be asked for its drafts");
   }
   plan_retries_.Succeeded(kDrafts);
   ReceivedRows rows(parts_.queue);
   for (const std::string& key : *changed) {
     const absl::StatusOr<QueuedSeries> series = rows.Get(key);
     if (!series.ok()) continue;
-    Tell(absl::OkStatus(),
-         absl::StrCat("series ", key, ": draft -> ", SeriesStateName(series->state)));
+    Log(absl::OkStatus(),
+        absl::StrCat("series ", key, ": draft -> ", SeriesStateName(series->state)));
   }
 }
 
@@ -129,15 +129,15 @@ void BridgeService::WorkOnPlans() {
   FollowDrafts();
   ReceivedRows rows(parts_.queue);
   const absl::StatusOr<std::vector<QueuedSeries>> all = rows.List();
-  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  if (!all.ok()) return Log(all.status(), "the queue cannot be read");
   for (QueuedSeries series : *all) {
     while (HasPlanStep(series.state) && !stopping() && plan_retries_.Due(series.key)) {
       threads_.BeginStep(kPlans);
       const std::string before = SeriesStateName(series.state);
       const absl::Status status = parts_.plans->Step(&series);
       if (absl::IsCancelled(status)) return;
-      Tell(status, absl::StrCat("series ", series.key, ": ", before, " -> ",
-                                SeriesStateName(series.state)));
+      Log(status,
+          absl::StrCat("series ", series.key, ": ", before, " -> ", SeriesStateName(series.state)));
       if (status.ok()) {
         plan_retries_.Succeeded(series.key);
       } else {
@@ -154,29 +154,29 @@ void BridgeService::TakeHeard() {
     heard.swap(heard_);
   }
   std::deque<v1::Export> later;
-  for (v1::Export& told : heard) {
-    if (!TakeNow(told)) later.push_back(std::move(told));
+  for (v1::Export& reported : heard) {
+    if (!TakeNow(reported)) later.push_back(std::move(reported));
   }
   if (later.size() < heard.size()) Wake();
   MutexLock lock(mutex_);
-  for (v1::Export& told : later) {
-    const bool is_told_anew =
-        std::any_of(heard_.begin(), heard_.end(),
-                    [&told](const v1::Export& newer) { return newer.name() == told.name(); });
-    if (!is_told_anew && heard_.size() < kMaxHeard) heard_.push_back(std::move(told));
+  for (v1::Export& reported : later) {
+    const bool has_newer_report = std::any_of(
+        heard_.begin(), heard_.end(),
+        [&reported](const v1::Export& newer) { return newer.name() == reported.name(); });
+    if (!has_newer_report && heard_.size() < kMaxHeard) heard_.push_back(std::move(reported));
   }
 }
 
 // The watch may go on while Take fails because it reaches another server, which has gone.
-bool BridgeService::TakeNow(const v1::Export& told) {
-  if (!take_retries_.Due(told.name())) return false;
-  const absl::Status status = parts_.exports->Take(told);
-  if (!status.ok()) Tell(status, "an export cannot be queued");
+bool BridgeService::TakeNow(const v1::Export& reported) {
+  if (!take_retries_.Due(reported.name())) return false;
+  const absl::Status status = parts_.exports->Take(reported);
+  if (!status.ok()) Log(status, "an export cannot be queued");
   if (IsTransient(status)) {
-    take_retries_.Failed(told.name());
+    take_retries_.Failed(reported.name());
     return false;
   }
-  take_retries_.Succeeded(told.name());
+  take_retries_.Succeeded(reported.name());
   return true;
 }
 
@@ -184,15 +184,15 @@ void BridgeService::WorkOnExports() {
   TakeHeard();
   ExportRows rows(parts_.queue);
   const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
-  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  if (!all.ok()) return Log(all.status(), "the queue cannot be read");
   LookForTakenBack(*all);
   for (QueuedExport queued : *all) {
     while (HasExportStep(queued) && !stopping() && export_retries_.Due(queued.key)) {
       threads_.BeginStep(kExports);
       const std::string before = BridgeExportStateName(queued.state);
       const absl::Status status = parts_.exports->Step(&queued);
-      Tell(status,
-           absl::StrCat(queued.name, ": ", before, " -> ", BridgeExportStateName(queued.state)));
+      Log(status,
+          absl::StrCat(queued.name, ": ", before, " -> ", BridgeExportStateName(queued.state)));
       if (status.ok()) {
         export_retries_.Succeeded(queued.key);
       } else {
@@ -210,12 +210,12 @@ void BridgeService::LookForTakenBack(const std::vector<QueuedExport>& all) {
     if (queued.state != BridgeExportState::kAsked || stopping()) continue;
     threads_.BeginStep(kExports);
     const absl::StatusOr<bool> still_asked = parts_.exports->IsStillAsked(queued);
-    // The watch tells of a server that is away, and all are looked at again.
+    // The watch reports a server that is away, and all are looked at again.
     if (IsTransient(still_asked.status())) return;
     if (!still_asked.ok()) {
-      Tell(still_asked.status(), absl::StrCat(queued.name, " cannot be checked"));
+      Log(still_asked.status(), absl::StrCat(queued.name, " cannot be checked"));
     } else if (!*still_asked) {
-      Tell(absl::OkStatus(), absl::StrCat(queued.name, " was withdrawn"));
+      Log(absl::OkStatus(), absl::StrCat(queued.name, " was withdrawn"));
     }
   }
 }
@@ -223,7 +223,7 @@ void BridgeService::LookForTakenBack(const std::vector<QueuedExport>& all) {
 void BridgeService::WorkOnPictures() {
   ExportRows rows(parts_.queue);
   const absl::StatusOr<std::vector<QueuedExport>> all = rows.List();
-  if (!all.ok()) return Tell(all.status(), "the queue cannot be read");
+  if (!all.ok()) return Log(all.status(), "the queue cannot be read");
   std::map<std::string, Drawing> drawings;
   for (QueuedExport queued : *all) {
     if (queued.state != BridgeExportState::kAsked) continue;
@@ -233,7 +233,7 @@ void BridgeService::WorkOnPictures() {
     queued.attempts = drawing.attempts++;
     const absl::Status status = parts_.exports->Draw(queued);
     if (absl::IsCancelled(status)) return;
-    if (!status.ok()) Tell(status, absl::StrCat(queued.name, " waits without pictures"));
+    if (!status.ok()) Log(status, absl::StrCat(queued.name, " waits without pictures"));
     drawing.is_over = !MayCome(status);
     if (!drawing.is_over) picture_retries_.Failed(queued.key);
   }
@@ -251,10 +251,10 @@ void BridgeService::WatchServer() {
     return stopping();
   });
   const absl::Status status = parts_.server->WatchExports(
-      [this](const v1::Export& told) {
+      [this](const v1::Export& reported) {
         {
           MutexLock lock(mutex_);
-          if (heard_.size() < kMaxHeard) heard_.push_back(told);
+          if (heard_.size() < kMaxHeard) heard_.push_back(reported);
         }
         watch_retries_.Succeeded(kWatch);
         Wake();
@@ -262,7 +262,7 @@ void BridgeService::WatchServer() {
       cancelled);
   if (stopping()) return;
   watch_retries_.Failed(kWatch);
-  Tell(status, "the watch of exports ended; restarting it");
+  Log(status, "the watch of exports ended; restarting it");
 }
 
 }  // namespace tissueform

@@ -68,12 +68,12 @@ class BridgeService {
   void WorkOnPlans();
   void TakeHeard() ABSL_LOCKS_EXCLUDED(mutex_);
   // False: it is to be taken later.
-  bool TakeNow(const v1::Export& told);
+  bool TakeNow(const v1::Export& reported);
   void WorkOnExports();
   void LookForTakenBack(const std::vector<QueuedExport>& all);
   void WorkOnPictures();
   void WatchServer();
-  void Tell(const absl::Status& status, const std::string& line);
+  void Log(const absl::Status& status, const std::string& line);
   bool stopping() { return threads_.stopping(); }
 
   const BridgeServiceParts parts_;

@@ -35,17 +35,17 @@ std::string WithoutEmptyEnd(absl::string_view name) {
 // The patient that the PACS's query names: `kept` itself if both are the same.
 absl::StatusOr<PatientIdentity> AskWhoseItIs(PacsClient* pacs, const std::string& study_uid,
                                              const PatientIdentity& kept) {
-  absl::StatusOr<PatientSummary> told = pacs->FindPatient(study_uid);
-  if (absl::IsUnimplemented(told.status())) return kept;
-  if (absl::IsNotFound(told.status())) return SeriesIsGone();
-  if (!told.ok()) return Refused(told.status());
+  absl::StatusOr<PatientSummary> found = pacs->FindPatient(study_uid);
+  if (absl::IsUnimplemented(found.status())) return kept;
+  if (absl::IsNotFound(found.status())) return SeriesIsGone();
+  if (!found.ok()) return Refused(found.status());
   PatientIdentity now = {
-      .id = told->id.substr(0, kMaxIdentityBytes),
-      .issuer = told->issuer.empty() ? kept.issuer : told->issuer.substr(0, kMaxIdentityBytes),
-      .name = told->name.substr(0, kMaxIdentityBytes),
-      .birth_date = told->birth_date.empty() ? kept.birth_date
-                                             : told->birth_date.substr(0, kMaxIdentityBytes),
-      .readable = told->readable};
+      .id = found->id.substr(0, kMaxIdentityBytes),
+      .issuer = found->issuer.empty() ? kept.issuer : found->issuer.substr(0, kMaxIdentityBytes),
+      .name = found->name.substr(0, kMaxIdentityBytes),
+      .birth_date = found->birth_date.empty() ? kept.birth_date
+                                              : found->birth_date.substr(0, kMaxIdentityBytes),
+      .readable = found->readable};
   const bool same = now.readable && now.id == kept.id && now.issuer == kept.issuer &&
                     WithoutEmptyEnd(now.name) == WithoutEmptyEnd(kept.name) &&
                     now.birth_date == kept.birth_date;

@@ -142,14 +142,14 @@ class ConnectedCaseServer final : public CaseServer {
     return client->exports().Update(request).status();
   }
 
-  absl::Status WatchExports(const std::function<void(const v1::Export&)>& tell,
+  absl::Status WatchExports(const std::function<void(const v1::Export&)>& on_export,
                             const Cancellation& cancelled) override {
     TF_ASSIGN_OR_RETURN(TissueformClient* const client, Client());
     const std::unique_ptr<ExportWatchStream> watch = client->exports().Watch();
     WatchEnd end(watch.get(), cancelled);
     while (const std::optional<v1::WatchExportsResponse> heard = watch->Receive()) {
       end.Heard();
-      if (heard->has_export_()) tell(heard->export_());
+      if (heard->has_export_()) on_export(heard->export_());
     }
     return watch->Finish();
   }

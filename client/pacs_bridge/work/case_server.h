@@ -54,9 +54,9 @@ class CaseServer {
   virtual absl::StatusOr<v1::Export> GetExport(const std::string& name) = 0;
   virtual absl::Status UpdateExport(const std::string& name, v1::ExportState state,
                                     const std::string& detail, int stored_objects) = 0;
-  // Tells every export that is not done, and each that is asked for or changed, until the
+  // Reports every export that is not done, and each that is asked for or changed, until the
   // connection ends or `cancelled` says so, which is looked at every second.
-  virtual absl::Status WatchExports(const std::function<void(const v1::Export&)>& tell,
+  virtual absl::Status WatchExports(const std::function<void(const v1::Export&)>& on_export,
                                     const Cancellation& cancelled) = 0;
 };
 

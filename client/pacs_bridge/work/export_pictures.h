@@ -22,7 +22,7 @@ namespace tissueform {
 // so that a restart writes the same. Any thread. What it is given must outlive it.
 class ExportPictures {
  public:
-  // `warn`: told in one line that an export is written without a band; may be empty.
+  // `warn`: receives one line when an export is written without a band; may be empty.
   ExportPictures(CaseServer* server, ObjectWriter* writer,
                  std::function<void(const std::string& line)> warn)
       : server_(server), writer_(writer), warn_(std::move(warn)) {}
@@ -34,8 +34,8 @@ class ExportPictures {
   // Draws into `material.pictures` and asks for the band what is not there yet, unless another
   // thread does it for this export: then it waits. `queued.attempts` says how often it was tried.
   //
-  // Returns the band in mm, #V numbers; none, with a warning, too, where the server cannot tell
-  // one. Errors: Unavailable or another that MayCome names: to be tried again; the rest stays.
+  // Returns the band in mm, #V numbers; none, with a warning, too, where the server cannot
+  // give one. Errors: Unavailable or another that MayCome names: to be tried again; the rest stays.
   absl::StatusOr<std::vector<double>> Make(const QueuedExport& queued,
                                            const ExportMaterial& material)
       ABSL_LOCKS_EXCLUDED(mutex_);

@@ -69,24 +69,25 @@ absl::StatusOr<QueuedSeries> ExportWork::SeriesOfCase(const std::string& case_na
   return received_.GetByCase(case_name);
 }
 
-absl::Status ExportWork::Take(const v1::Export& told) {
-  if (IsDone(told.state())) return absl::OkStatus();
-  const absl::StatusOr<QueuedSeries> series = SeriesOfCase(told.case_());
+absl::Status ExportWork::Take(const v1::Export& reported) {
+  if (IsDone(reported.state())) return absl::OkStatus();
+  const absl::StatusOr<QueuedSeries> series = SeriesOfCase(reported.case_());
   if (absl::IsNotFound(series.status())) {
     if (options_.inform) {
-      options_.inform(absl::StrCat(told.name(), " has a case of another bridge and is left to it"));
+      options_.inform(
+          absl::StrCat(reported.name(), " has a case of another bridge and is left to it"));
     }
     return absl::OkStatus();
   }
   TF_RETURN_IF_ERROR(series.status());
   QueuedExport asked;
-  asked.name = told.name();
+  asked.name = reported.name();
   asked.key = NewQueueKey();
-  asked.prediction = told.prediction();
-  asked.case_name = told.case_();
+  asked.prediction = reported.prediction();
+  asked.case_name = reported.case_();
   asked.first_s = std::time(nullptr);
   TF_ASSIGN_OR_RETURN(QueuedExport queued, rows_.Add(asked));
-  if (told.state() != v1::EXPORT_STATE_WAITING) return absl::OkStatus();
+  if (reported.state() != v1::EXPORT_STATE_WAITING) return absl::OkStatus();
   // It does not know, or asks again for what has failed.
   if (queued.state == BridgeExportState::kFailed && queued.done_s != 0) {
     queued.state = BridgeExportState::kAsked;
@@ -121,11 +122,11 @@ absl::Status ExportWork::RunStep(QueuedExport* queued) {
     case BridgeExportState::kWritten:
       return Send(queued);
     case BridgeExportState::kSent:
-      return TellStored(queued);
+      return ReportStored(queued);
     case BridgeExportState::kFailed:
-      return queued->done_s == 0 ? TellFailed(queued) : absl::OkStatus();
+      return queued->done_s == 0 ? ReportFailed(queued) : absl::OkStatus();
     case BridgeExportState::kAsked:
-    case BridgeExportState::kTold:
+    case BridgeExportState::kReported:
       return absl::OkStatus();
   }
   return absl::OkStatus();
@@ -319,24 +320,24 @@ absl::Status ExportWork::Send(QueuedExport* queued) {
   return absl::OkStatus();
 }
 
-absl::Status ExportWork::TellStored(QueuedExport* queued) {
+absl::Status ExportWork::ReportStored(QueuedExport* queued) {
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedObject> objects, rows_.ListObjects(queued->name));
-  const absl::Status told =
+  const absl::Status reply =
       server_->UpdateExport(queued->name, v1::EXPORT_STATE_STORED, "", CountSent(objects));
   // NotFound: the user has taken the export back since then; it is in the PACS nevertheless.
-  if (!told.ok() && !absl::IsNotFound(told)) return told;
+  if (!reply.ok() && !absl::IsNotFound(reply)) return reply;
   TF_FAULT_POINT("export.told");
   std::error_code ignored;
   fs::remove_all(queue_->object_folder(queued->key), ignored);
-  queued->state = BridgeExportState::kTold;
+  queued->state = BridgeExportState::kReported;
   queued->done_s = std::time(nullptr);
   return absl::OkStatus();
 }
 
-absl::Status ExportWork::TellFailed(QueuedExport* queued) {
-  const absl::Status told =
+absl::Status ExportWork::ReportFailed(QueuedExport* queued) {
+  const absl::Status reply =
       server_->UpdateExport(queued->name, v1::EXPORT_STATE_FAILED, DetailOf(queued->note), 0);
-  if (!told.ok() && !absl::IsNotFound(told)) return told;
+  if (!reply.ok() && !absl::IsNotFound(reply)) return reply;
   std::error_code ignored;
   fs::remove_all(queue_->object_folder(queued->key), ignored);
   queued->done_s = std::time(nullptr);

@@ -23,8 +23,8 @@ namespace tissueform {
 struct ExportWorkOptions {
   // How long a kept header stands for the PACS's own where the PACS returns no headers.
   std::chrono::seconds header_lifetime = std::chrono::hours(24) * 90;
-  // Told in one line what is left out although nothing stops for it; nothing of a patient. May be
-  // empty.
+  // Receives one line about what is left out although nothing stops for it. The line names no
+  // patient. May be empty.
   std::function<void(const std::string& line)> warn = {};
   // The same of what is nothing to worry about.
   std::function<void(const std::string& line)> inform = {};
@@ -37,8 +37,8 @@ struct ExportWorkOptions {
 //              seen, goes back to asked, with a note
 //   fetched    puts UIDs into the queue, then writes the objects
 //   written    asks the PACS for each, and sends those that it has not
-//   sent       tells the server
-//   told
+//   sent       reports to the server
+//   told       (kReported) the server knows
 //
 // Every step may be repeated: an object keeps its UID, so the PACS gets each once. One thread at a
 // time for Take and Step, and beside it one for Draw. What it is given must outlive it.
@@ -58,7 +58,7 @@ class ExportWork {
   // Takes what the server reports of an export into the queue. A case that is unknown here belongs
   // to another bridge: nothing happens but a line that says so. Errors: those of the queue and,
   // while drafts wait, of the server.
-  absl::Status Take(const v1::Export& told);
+  absl::Status Take(const v1::Export& reported);
 
   // Draws the pictures of a requested export for the person who confirms it, and asks for its band;
   // does nothing if they exist. Step waits for it where it needs them. `queued.attempts` says how
@@ -71,7 +71,7 @@ class ExportWork {
   absl::StatusOr<bool> IsStillAsked(const QueuedExport& queued);
 
   // The next step of an export, whose new state is written to the queue and into it. An error that
-  // is no transient one makes it kFailed. Also tells the server of one that waits or has failed.
+  // is no transient one makes it kFailed. Also reports to the server one that waits or has failed.
   //
   // Errors: those of the step; they hold nothing of a patient.
   absl::Status Step(QueuedExport* queued);
@@ -87,8 +87,8 @@ class ExportWork {
   absl::Status Write(QueuedExport* queued);
   absl::Status Send(QueuedExport* queued);
   absl::Status SendMissing(const QueuedExport& queued, std::vector<QueuedObject>* objects);
-  absl::Status TellStored(QueuedExport* queued);
-  absl::Status TellFailed(QueuedExport* queued);
+  absl::Status ReportStored(QueuedExport* queued);
+  absl::Status ReportFailed(QueuedExport* queued);
 
   BridgeQueue* const queue_;
   ExportRows rows_;

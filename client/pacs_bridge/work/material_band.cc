@@ -21,7 +21,7 @@
 namespace tissueform {
 namespace {
 
-bool TellsOfMaterial(v1::DeformationModel model) {
+bool DependsOnMaterial(v1::DeformationModel model) {
   return model == v1::DEFORMATION_MODEL_LINEAR_ELASTIC ||
          model == v1::DEFORMATION_MODEL_NEO_HOOKEAN;
 }
@@ -43,7 +43,7 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
       !prepared.mutable_ranges()->ParseFromString(*contents.material_ranges)) {
     return absl::DataLossError("the case's session request or ranges of the material are damaged");
   }
-  // Linear elasticity tells the band of either model, and its columns are the cheaper ones.
+  // Linear elasticity gives the band of either model, and its columns are the cheaper ones.
   request.mutable_create()->set_model(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
   TF_ASSIGN_OR_RETURN(const v1::Session session, client->PrepareSession(request, {}));
   const auto end = absl::MakeCleanup(
@@ -62,7 +62,7 @@ absl::StatusOr<std::vector<double>> AskMaterialBand(TissueformClient* client,
 
 std::string WhyNoMaterialBand(const CaseFile& contents, const v1::Prediction& prediction) {
   if (!contents.material_ranges) return "the case has no ranges of the material";
-  if (!TellsOfMaterial(prediction.model())) {
+  if (!DependsOnMaterial(prediction.model())) {
     return "only predictions of linear_elastic and neo_hookean have a band of uncertainty";
   }
   v1::CreateSessionRequest request;

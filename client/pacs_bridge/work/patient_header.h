@@ -15,8 +15,8 @@ namespace tissueform {
 // Puts what the PACS says of the patient now into the file `path`. Where it offers no service that
 // gives a header, the kept one stands for it as long as it may, if the PACS's query for the study
 // names the same patient; or offers no query either. Then no file is written unless it stands. An
-// ID or a name must be the same; issuer and birth date, which a PACS need not tell, where it tells
-// them.
+// ID or a name must be the same; issuer and birth date only where the PACS returns them, which it
+// need not do.
 //
 // Errors: FailedPrecondition: the PACS has the series no longer, or offers no header and none is
 // kept; Unavailable: it refuses to answer, which it may do again or not; those of PacsClient.

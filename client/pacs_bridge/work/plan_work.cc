@@ -172,9 +172,9 @@ absl::StatusOr<PlanBuildAnswer> PlanWork::CallOn(const QueuedSeries& series,
                     .max_seconds = options_.max_seconds,
                     .max_file_bytes = int64_t{4} << 30};
   PlanBuildCallOptions calling;
-  if (options_.tell) {
+  if (options_.on_progress) {
     calling.tell = [&](absl::string_view stage, double fraction) {
-      options_.tell(series.key, stage, fraction);
+      options_.on_progress(series.key, stage, fraction);
     };
   }
   calling.cancel = options_.cancel;

@@ -29,9 +29,9 @@ struct PlanWorkOptions {
   bool accept_defects = false;  // publish also a plan that is not ready
   // Readable when the work is to end; -1: never.
   int cancel = -1;
-  // Told what begins and how much of building is done; may be empty.
-  std::function<void(const std::string& series, absl::string_view stage, double fraction)> tell =
-      {};
+  // Receives what begins and how much of building is done; may be empty.
+  std::function<void(const std::string& series, absl::string_view stage, double fraction)>
+      on_progress = {};
 };
 
 // From a chosen series to a case on the server, one durable step after the other:
@@ -44,7 +44,7 @@ struct PlanWorkOptions {
 // Or to a draft there, which a person makes a case of:
 //
 //   drafting   the CT without what names the patient, and the recipe, to the server
-//   draft      FollowDrafts: until the server tells of a case, or no more of the draft
+//   draft      FollowDrafts: until the server reports a case, or no longer the draft
 //   published
 //
 // Every step may be repeated: a folder appears at once, a case is named by its bytes before it is

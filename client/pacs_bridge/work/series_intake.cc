@@ -169,9 +169,9 @@ absl::StatusOr<std::vector<std::string>> SeriesIntake::Flush() {
 
 const std::vector<SeriesSummary>* SeriesIntake::AskPacs(const std::string& study_uid) {
   if (!options_.find_series) return nullptr;
-  auto found = told_.find(study_uid);
-  if (found == told_.end()) {
-    found = told_.emplace(study_uid, options_.find_series(study_uid)).first;
+  auto found = pacs_series_.find(study_uid);
+  if (found == pacs_series_.end()) {
+    found = pacs_series_.emplace(study_uid, options_.find_series(study_uid)).first;
   }
   return found->second.ok() ? &*found->second : nullptr;
 }
@@ -186,8 +186,8 @@ absl::StatusOr<std::optional<SeriesState>> SeriesIntake::Judge(const QueuedSerie
   if (!quiet && (!progress.ended || progress.aborted || progress.asked)) return std::nullopt;
   std::optional<int64_t> expected;
   if (const std::vector<SeriesSummary>* const study = AskPacs(series.study_uid)) {
-    for (const SeriesSummary& told : *study) {
-      if (told.series_uid == series.uid && told.instances > 0) expected = told.instances;
+    for (const SeriesSummary& summary : *study) {
+      if (summary.series_uid == series.uid && summary.instances > 0) expected = summary.instances;
     }
   }
   {
@@ -219,12 +219,12 @@ absl::StatusOr<bool> SeriesIntake::IsAllThere(const std::string& study_uid) {
   }
   if (options_.now() - progress.last >= options_.quiet) return true;
   if (progress.asked) return false;
-  const std::vector<SeriesSummary>* const told = AskPacs(study_uid);
-  if (told == nullptr) return false;
+  const std::vector<SeriesSummary>* const reported = AskPacs(study_uid);
+  if (reported == nullptr) return false;
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> known, rows_.ListStudy(study_uid));
   std::map<std::string, int64_t> images;
   for (const QueuedSeries& series : known) images[series.uid] = series.images;
-  return std::all_of(told->begin(), told->end(), [&](const SeriesSummary& series) {
+  return std::all_of(reported->begin(), reported->end(), [&](const SeriesSummary& series) {
     const auto found = images.find(series.series_uid);
     return !MayBeChosen(series) || (found != images.end() && found->second >= series.instances);
   });
@@ -238,7 +238,7 @@ void SeriesIntake::ForgetOldStudies(const std::set<std::string>& waiting) {
 }
 
 absl::StatusOr<std::vector<std::string>> SeriesIntake::Settle() {
-  told_.clear();
+  pacs_series_.clear();
   TF_ASSIGN_OR_RETURN(std::vector<std::string> changed, Flush());
   std::set<std::string> busy;
   TF_ASSIGN_OR_RETURN(const std::vector<QueuedSeries> receiving,

@@ -38,7 +38,7 @@ struct SeriesIntakeOptions {
 // A file that is on the disk is received: its sender may get an answer before the queue knows it,
 // and Recover finds it there after a crash. A series is complete
 //   * when its association has ended and the queue has as many images as the PACS says, at once;
-//   * when nothing came for `quiet`, and the PACS confirms it; or the PACS cannot tell, its
+//   * when nothing came for `quiet`, and the PACS confirms it; or the PACS does not know, its
 //     association was released by its sender, and no slice between first and last is missing.
 // Otherwise it is incomplete after `quiet`, and nothing is made of it unless more comes.
 //
@@ -97,7 +97,7 @@ class SeriesIntake {
     bool asked = false;  // the PACS, since something has changed
   };
 
-  // Both return keys of series of which there is something to tell.
+  // Both return keys of series that have news to report.
   absl::StatusOr<std::vector<std::string>> Flush();
   absl::StatusOr<std::vector<std::string>> PutSeries(const std::vector<const Arrival*>& arrivals);
   absl::StatusOr<std::vector<std::string>> RemarkOn(const QueuedSeries& series,
@@ -120,7 +120,7 @@ class SeriesIntake {
 
   ReceivedRows rows_;
   // Of the thread of Settle.
-  std::map<std::string, absl::StatusOr<std::vector<SeriesSummary>>> told_;  // by study
+  std::map<std::string, absl::StatusOr<std::vector<SeriesSummary>>> pacs_series_;  // by study
 
   Mutex mutex_;
   std::vector<Arrival> arrivals_ ABSL_GUARDED_BY(mutex_);

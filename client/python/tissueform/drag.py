@@ -118,7 +118,7 @@ class Drag:
 
     def send(self, poses: Poses, *, commit: bool = False) -> int:
         """Sends poses, one for each handle that moves; the others rest. Returns at once, with the number (sequence) of these poses.
-        commit: the server stores them as the session's poses (last_committed tells when they are durable).
+        commit: the server stores them as the session's poses (last_committed shows when they are durable).
 
         Errors: InvalidInput. Whether they arrive is seen where frames are received.
         """

@@ -214,10 +214,10 @@ class PlanBuildCalls:
     def _upload(self, payloads: List[FilePayload], on_progress: Optional[StageProgress]) -> None:
         total, before = sum(payload.total_bytes for payload in payloads), 0
         for payload in payloads:
-            def tell(sent: int, _: int, before: int = before) -> None:
+            def report_sent(sent: int, _: int, before: int = before) -> None:
                 if on_progress is not None:
                     on_progress("uploading", _UPLOAD_SHARE * (before + sent) / total)
-            self._send(payload, tell)
+            self._send(payload, report_sent)
             before += payload.total_bytes
 
     def _send(self, payload: FilePayload, on_progress: Progress) -> None:

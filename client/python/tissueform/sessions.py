@@ -256,4 +256,4 @@ def create_session(caller: Caller, mesh: Mesh, handles: Mapping[str, Any], fixed
     except ServerError as error:
         if error.reason != "NOT_IMPLEMENTED":
             raise
-    return Session(caller, caller.unary(stub.CreateSession, request))  # version 0.1 does not tell its stages
+    return Session(caller, caller.unary(stub.CreateSession, request))  # version 0.1 does not report its stages

@@ -179,12 +179,12 @@ async function knowsCallers(): Promise<boolean> {
 
 async function fetchCase(name: string): Promise<CaseFile> {
   const bar = el("progress", { attributes: { max: "1", "aria-label": "Progress" } });
-  const told = el("p", { class: "told", text: "Asking the server" });
-  show(waitingPage("Opening the case", bar, told));
+  const status = el("p", { class: "told", text: "Asking the server" });
+  show(waitingPage("Opening the case", bar, status));
   const entry = await gateway.cases.getCase({ name }).catch((thrown) => Promise.reject(toCallError(thrown)));
   const onProgress = (done: number, total: number) => {
     bar.value = done / total;
-    told.textContent = formatProgress(done, total);
+    status.textContent = formatProgress(done, total);
   };
   const file = await openCase(serverSource(gateway, entry), onProgress);
   return withContact(file, parameters().contact);

@@ -47,7 +47,7 @@ class SilentPort {
   int port_ = 0;
 };
 
-TEST(TissueformClientTest, NobodyThereIsToldWithAddressAndAdvice) {
+TEST(TissueformClientTest, UnreachableServerIsReportedWithAddressAndAdvice) {
   const SilentPort silent;
   TissueformClient::Options options;
   options.connect_deadline = std::chrono::milliseconds(200);

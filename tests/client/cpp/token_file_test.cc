@@ -53,7 +53,7 @@ TEST_F(TokenFileTest, ARenewedTokenIsRead) {
   EXPECT_EQ(file->Current(), "second.token");
 }
 
-TEST_F(TokenFileTest, WhatIsNoTokenLeavesTheOneBefore) {
+TEST_F(TokenFileTest, InvalidTokenLeavesThePreviousOne) {
   ASSERT_OK_AND_ASSIGN(const auto file, TokenFile::Open(path_));
   for (const char* text : {"", "two words", "\x01"}) {
     Write(text);
@@ -82,13 +82,13 @@ TEST_F(TokenFileTest, ErrorsHoldNothingOfTheToken) {
   EXPECT_THAT(TokenFile::Open(folder_ / "none"), StatusIs(absl::StatusCode::kNotFound));
 }
 
-TEST_F(TokenFileTest, ALongCallIsToldOfARenewedToken) {
+TEST_F(TokenFileTest, LongCallReceivesRenewedToken) {
   ASSERT_OK_AND_ASSIGN(const auto file, TokenFile::Open(path_));
-  std::promise<std::string> told;
+  std::promise<std::string> received;
   TokenRenewal renewal(file, file->Current(),
-                       [&told](const std::string& token) { told.set_value(token); });
+                       [&received](const std::string& token) { received.set_value(token); });
   Write("second.token");
-  EXPECT_EQ(told.get_future().get(), "second.token");
+  EXPECT_EQ(received.get_future().get(), "second.token");
 }
 
 }  // namespace

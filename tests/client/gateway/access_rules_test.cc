@@ -68,7 +68,7 @@ TEST_F(AccessRulesTest, PagesFromElsewhereMayNot) {
   EXPECT_FALSE(rules_.AllowsOrigin(twice));
 }
 
-TEST_F(AccessRulesTest, OnlyAllowedOriginsOfOthersAreToldSo) {
+TEST_F(AccessRulesTest, OnlyAllowedForeignOriginsAreForeign) {
   EXPECT_TRUE(rules_.IsForeignOrigin("https://viewer.example.org"));
   EXPECT_FALSE(rules_.IsForeignOrigin("http://localhost:8080"));
 }

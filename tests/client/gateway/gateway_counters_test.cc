@@ -11,7 +11,7 @@
 namespace tissueform {
 namespace {
 
-TEST(GatewayCounters, WhatHasNotHappenedIsNotTold) {
+TEST(GatewayCounters, EventsThatDidNotOccurAreNotListed) {
   GatewayCounters counters;
   EXPECT_EQ(counters.Text(), "");
   counters.Add(GatewayEvent::kWrongHost);
@@ -21,7 +21,7 @@ TEST(GatewayCounters, WhatHasNotHappenedIsNotTold) {
   EXPECT_EQ(counters.Count(GatewayEvent::kWrongHost), 2);
 }
 
-TEST(GatewayCounters, ThePageTellsWhatWasDoneApartFromWhatWasRefused) {
+TEST(GatewayCounters, MetricsPageSeparatesEventsFromRefusals) {
   GatewayCounters counters;
   counters.Add(GatewayEvent::kSocketCall);
   counters.Add(GatewayEvent::kMalformedRequest);

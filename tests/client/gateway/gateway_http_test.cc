@@ -230,7 +230,7 @@ TEST_F(GatewayHttpTest, FramesThatAreNoneAreRefused) {
   EXPECT_EQ(Count(GatewayEvent::kMalformedFrame), 5);
 }
 
-TEST_F(GatewayHttpTest, WhatLivesLongIsToldOfTheWebSocket) {
+TEST_F(GatewayHttpTest, LongLivedCallsAreReferredToTheWebSocket) {
   for (const char* method :
        {"DeformService/Watch", "DeformService/Deform", "MeshService/UploadMesh",
         "SessionService/PrepareSession", "NewService/NewMethod"}) {
@@ -248,7 +248,7 @@ TEST_F(GatewayHttpTest, TheDeadlineIsTheClients) {
               HasSubstr("grpc-status: 3\r\n"));
 }
 
-TEST_F(GatewayHttpTest, WhoGoesAwayCancelsTheCall) {
+TEST_F(GatewayHttpTest, DisconnectingClientCancelsTheCall) {
   {
     RawClient client(port());
     client.Send(Request(absl::StrCat("POST ", kWebSilent), WebFields() + "content-length: 5\r\n") +

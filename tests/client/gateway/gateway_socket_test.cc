@@ -50,7 +50,7 @@ TEST_F(GatewaySocketTest, MessagesGoBothWaysUntilBothSidesHaveEnded) {
   EXPECT_EQ(socket.ReceiveClose(), 1000);
 }
 
-TEST_F(GatewaySocketTest, WhoAsksForItIsToldTheServersHeadersFirst) {
+TEST_F(GatewaySocketTest, ServerHeadersArriveFirstOnRequest) {
   RawSocket socket(port());
   v1::GatewayCallStart start;
   start.set_method(kEcho);
@@ -69,7 +69,7 @@ TEST_F(GatewaySocketTest, WhoAsksForItIsToldTheServersHeadersFirst) {
   EXPECT_EQ(socket.ReceiveEnd().code(), 0);
 }
 
-TEST_F(GatewaySocketTest, WhoAsksForHeadersThatThereAreNoneOfIsToldTheRest) {
+TEST_F(GatewaySocketTest, CallWithoutServerHeadersDeliversTheRest) {
   RawSocket socket(port());
   v1::GatewayCallStart start;
   start.set_method("/tissueform.v1.SessionService/GetSession");
@@ -79,7 +79,7 @@ TEST_F(GatewaySocketTest, WhoAsksForHeadersThatThereAreNoneOfIsToldTheRest) {
   EXPECT_EQ(socket.ReceiveEnd().code(), 0);
 }
 
-TEST_F(GatewaySocketTest, WhoAsksForHeartbeatsHearsThemWhileTheServerIsSilent) {
+TEST_F(GatewaySocketTest, HeartbeatsArriveOnRequestWhileTheServerIsSilent) {
   RawSocket socket(port());
   v1::GatewayCallStart start;
   start.set_method(kSilent);
@@ -113,7 +113,7 @@ TEST_F(GatewaySocketTest, HeartbeatsLeaveTheServersMessagesInOrder) {
   }
 }
 
-TEST_F(GatewaySocketTest, WhatIsSentAtOnceArrivesInOrder) {
+TEST_F(GatewaySocketTest, MessagesSentAtOnceArriveInOrder) {
   RawSocket socket(port());
   std::string sent;
   socket.Start(kEcho);
@@ -305,7 +305,7 @@ TEST_F(GatewaySocketTest, ASocketWithoutAStartIsClosed) {
 }
 
 // The server's messages are left with the server: what the gateway and TCP hold is a few of them.
-TEST_F(GatewaySocketTest, WhoTakesNothingIsClosedAndFillsNothing) {
+TEST_F(GatewaySocketTest, StalledClientIsClosedAndFillsNoBuffers) {
   GatewayLimits limits;
   limits.stall_deadline = std::chrono::seconds(1);
   Restart(limits);
@@ -372,7 +372,7 @@ TEST_F(GatewaySocketTest, OtherOriginsAreRefused) {
   EXPECT_EQ(Count(GatewayEvent::kWrongOrigin), 1);
 }
 
-TEST_F(GatewaySocketTest, AnEndingGatewayTellsEverySocket) {
+TEST_F(GatewaySocketTest, DrainingGatewayNotifiesEverySocket) {
   RawSocket waiting(port());
   waiting.Start(kSilent);
   RawSocket unused(port());
@@ -401,7 +401,7 @@ class ProxiedEndTest : public GatewaySocketTest,
   }
 };
 
-TEST_P(ProxiedEndTest, WhatTheServerHasSaidIsToldToThePage) {
+TEST_P(ProxiedEndTest, ServerStatusReachesThePage) {
   for (const auto code : {grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::NOT_FOUND}) {
     google::rpc::Status details;
     details.set_code(code);
@@ -413,12 +413,12 @@ TEST_P(ProxiedEndTest, WhatTheServerHasSaidIsToldToThePage) {
   }
 }
 
-TEST_P(ProxiedEndTest, WhatNobodyHasCancelledIsNotToldAsCancelled) {
-  const auto told =
+TEST_P(ProxiedEndTest, CancellationByProxyIsReportedAsUnavailable) {
+  const auto expected =
       GetParam() == grpc::StatusCode::CANCELLED ? grpc::StatusCode::UNAVAILABLE : GetParam();
   for (const char* details : {"", "\xff\xff"}) {
     const v1::GatewayCallEnd end = EndOf(details);
-    EXPECT_EQ(end.code(), told);
+    EXPECT_EQ(end.code(), expected);
     EXPECT_EQ(end.message(), "Received RST_STREAM with error code 8");
   }
 }

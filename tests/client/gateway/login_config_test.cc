@@ -62,14 +62,14 @@ class LoginGatewayTest : public GatewayTest {
                                .audience = "tissueform"};
 };
 
-TEST_F(LoginGatewayTest, WithoutAProviderThePageIsToldOfNone) {
+TEST_F(LoginGatewayTest, WithoutAProviderTheConfigIsEmpty) {
   const std::string reply = Get("/config.json", {});
   EXPECT_EQ(StatusOf(reply), 200);
   EXPECT_THAT(reply, HasSubstr("\r\n\r\n{}\n"));
   EXPECT_THAT(reply, HasSubstr("connect-src 'self';"));
 }
 
-TEST_F(LoginGatewayTest, ThePageIsToldOfTheProviderAndMayAskItAlone) {
+TEST_F(LoginGatewayTest, PageReceivesTheProviderAndMayConnectToNoOther) {
   const std::string reply = Get("/config.json", clinic_);
   EXPECT_THAT(reply, HasSubstr("content-type: application/json\r\n"));
   EXPECT_THAT(reply, HasSubstr("cache-control: no-store\r\n"));

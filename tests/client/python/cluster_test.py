@@ -203,8 +203,8 @@ class ClusterTest(unittest.TestCase):
                 self.assertEqual(self.played.tokens.get(timeout=10), "second")
                 file.write_text("not a token")
                 client.session(NAME)
-        told = [headers["authorization"] for headers in self.played.headers]
-        self.assertEqual((told[0], told[-1]), ("Bearer first", "Bearer second"))
+        sent = [headers["authorization"] for headers in self.played.headers]
+        self.assertEqual((sent[0], sent[-1]), ("Bearer first", "Bearer second"))
 
     def test_an_error_that_is_not_lost_ends_the_drag(self):
         self.played.script = ["", "", Fault(grpc.StatusCode.ABORTED, "SESSION_UPDATED")]

@@ -72,7 +72,7 @@ export async function beginBuild(gateway: Gateway, input: BuildInput, onProgress
   }
 }
 
-/** Tells the build as it goes on; resolves with it once it is done. Rejects with a CallError or with the reason of `signal`. */
+/** Reports the build as it goes on; resolves with it once it is done. Rejects with a CallError or with the reason of `signal`. */
 export async function watchBuild(gateway: Gateway, name: string, onBuild: (build: PlanBuild) => void, signal: AbortSignal): Promise<PlanBuild> {
   let last: PlanBuild | null = null;
   const take = (build: PlanBuild) => {

@@ -36,7 +36,7 @@ export function buildStep(gateway: Gateway, draft: PlanDraft, load: () => Promis
   const titleId = newId("title");
   const title = el("input", { id: titleId, attributes: { type: "text", autocomplete: "off", maxlength: "200" } });
   title.value = proposedTitle;
-  const told = el("p", { class: "told", attributes: { role: "status" } });
+  const status = el("p", { class: "told", attributes: { role: "status" } });
   const progress = el("progress", { attributes: { max: "1", "aria-label": "Progress" } });
   const result = el("div", { class: "result" });
   let running: Run | null = null;
@@ -50,7 +50,7 @@ export function buildStep(gateway: Gateway, draft: PlanDraft, load: () => Promis
     const showBuild = (build: PlanBuild) => {
       builds.show(build);
       if (!isShown()) return;
-      told.textContent = stateText(build);
+      status.textContent = stateText(build);
       progress.value = build.fraction;
     };
     problem.show("");
@@ -63,12 +63,12 @@ export function buildStep(gateway: Gateway, draft: PlanDraft, load: () => Promis
       showBuild(begun);
       const build = isDone(begun) ? begun : await watchBuild(gateway, begun.name, showBuild, own.ending.signal);
       if (!isShown()) return;
-      told.textContent = stateText(build);
+      status.textContent = stateText(build);
       if (build.state === PlanBuildState.SUCCEEDED) await showResult(build);
       else problem.show(build.detail === "" ? "" : messageOf(build.detail));
     } catch (thrown) {
       if (!isShown()) return;
-      told.textContent = "";
+      status.textContent = "";
       problem.show(messageOf(thrown));
     } finally {
       if (running === own) {
@@ -88,13 +88,13 @@ export function buildStep(gateway: Gateway, draft: PlanDraft, load: () => Promis
   const start = button("Build the plan", () =>
     void run(async ({ signal }) => {
       parseRecipe(recipeText(draft.recipe));
-      told.textContent = "Packing the CT";
+      status.textContent = "Packing the CT";
       const ct = draft.received === null ? await packedCt((share) => (progress.value = share)) : { draft: draft.received };
       const ofLabels = draft.labels === null ? null : await (await load()).nrrdOfLabels(draft.labels);
       signal.throwIfAborted();
       const input = { recipeText: recipeText(draft.recipe), ct, labels: ofLabels, title: title.value, requestId: randomId() };
       return beginBuild(gateway, input, (share) => {
-        told.textContent = "Sending the CT";
+        status.textContent = "Sending the CT";
         progress.value = share;
       }, signal);
     }), { class: "primary" });
@@ -105,7 +105,7 @@ export function buildStep(gateway: Gateway, draft: PlanDraft, load: () => Promis
     const { ending, name } = running;
     running.isCancelled = true;
     ending.abort(new Error("canceled"));
-    told.textContent = "The build was canceled.";
+    status.textContent = "The build was canceled.";
     if (name !== "") void discardBuild(gateway, name).catch((thrown) => problem.show(messageOf(thrown))).then(builds.refresh);
   });
   const setRunning = (isRunning: boolean) => {
@@ -131,7 +131,7 @@ export function buildStep(gateway: Gateway, draft: PlanDraft, load: () => Promis
       el("div", { class: "field" }, [el("label", { text: "Title of the case", attributes: { for: titleId } }), title]),
       el("p", { class: "quiet", text: "Others who may open the case read the title: do not write the patient's name." }),
       el("div", { class: "buttons" }, [start, cancel, keep]),
-      told,
+      status,
       progress,
       problem.element,
     ]),

@@ -27,7 +27,7 @@ export interface ReceivedCt {
 /** Files become a volume: a folder, a zip or a volume, of which one series is chosen; and a label map, or none. `received` is read at once. */
 export function ctStep(draft: PlanDraft, load: () => Promise<CtReaders>, onVolume: () => void, received: ReceivedCt | null = null): Step {
   const origin = el("p", { class: "quiet" });
-  const told = el("p", { class: "told", attributes: { role: "status" } });
+  const status = el("p", { class: "told", attributes: { role: "status" } });
   const problem = problemBox();
   const progress = el("progress", { attributes: { max: "1", "aria-label": "Progress" } });
   progress.hidden = true;
@@ -43,14 +43,14 @@ export function ctStep(draft: PlanDraft, load: () => Promise<CtReaders>, onVolum
     reading.abort(new Error("replaced"));
     const own = (reading = new AbortController());
     problem.show("");
-    told.textContent = text;
+    status.textContent = text;
     progress.hidden = false;
     try {
       await run(own.signal, (share) => (progress.value = share));
-      if (own === reading) told.textContent = "";
+      if (own === reading) status.textContent = "";
     } catch (thrown) {
       if (own !== reading) return;
-      told.textContent = "";
+      status.textContent = "";
       problem.show(messageOf(thrown));
     } finally {
       if (own === reading) progress.hidden = true;
@@ -88,7 +88,7 @@ export function ctStep(draft: PlanDraft, load: () => Promise<CtReaders>, onVolum
   const element = section("CT", [
     origin,
     dropZone((files) => void takeFiles(() => files)),
-    told,
+    status,
     progress,
     problem.element,
     seriesList,

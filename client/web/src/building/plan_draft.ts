@@ -88,20 +88,20 @@ export class PlanDraft {
   change(recipe: Recipe, isFinal = true): void {
     this.preview = isFinal ? null : recipe;
     if (isFinal) this.keep(recipe);
-    this.tell();
+    this.notify();
   }
 
   undo(): void {
     this.preview = null;
     this.history.undo();
     this.store();
-    this.tell();
+    this.notify();
   }
 
   select(segment: number, plane: string | null): void {
     this.selectedSegment = segment;
     this.selectedPlane = plane;
-    this.tell();
+    this.notify();
   }
 
   setCrosshair(point: Vector): void {
@@ -115,7 +115,7 @@ export class PlanDraft {
     this.showVolume();
     const { grid } = this.shown as Volume;
     this.crosshair = rounded(middleOf(grid));
-    this.tell();
+    this.notify();
   }
 
   /** What slices show; a copy of the values only where the recipe shifts them. */
@@ -195,7 +195,7 @@ export class PlanDraft {
     }
   }
 
-  private tell(): void {
+  private notify(): void {
     this.selectedSegment = Math.max(0, Math.min(this.selectedSegment, this.recipe.segments.length - 1));
     if (this.selectedPlane !== null && !this.planes.some(({ id }) => id === this.selectedPlane)) this.selectedPlane = null;
     this.listeners.forEach((listener) => listener(this));

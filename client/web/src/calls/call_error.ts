@@ -64,8 +64,8 @@ export function callErrorOf(code: number, message: string, details: Uint8Array):
   const isChanged = status !== undefined && status.code !== code && Code[status.code] !== undefined;
   const [saidCode, said] = isChanged ? [status.code, status.message] : [code, message];
   const info = infoOf(status);
-  const told = said === "" ? describe(saidCode) : said;
-  return new CallError(saidCode === Code.Canceled ? Code.Unavailable : (saidCode as Code), told, info?.reason ?? "", info?.metadata.node ?? "");
+  const text = said === "" ? describe(saidCode) : said;
+  return new CallError(saidCode === Code.Canceled ? Code.Unavailable : (saidCode as Code), text, info?.reason ?? "", info?.metadata.node ?? "");
 }
 
 /** What a call that this page has not cancelled has failed with, where CANCELLED is UNAVAILABLE, too. */

@@ -164,7 +164,7 @@ export class CallSocket<M extends DescMethod> {
 
   private heard(): void {
     this.clock.heard();
-    this.tellQuiet(false);
+    this.reportQuiet(false);
   }
 
   private silent(silentS: number): void {
@@ -172,10 +172,10 @@ export class CallSocket<M extends DescMethod> {
     if (silentS >= limit) {
       this.patience.gaveUp();
       this.end(this.isOpened ? new CallError(Code.Unavailable, `the server has not answered for ${silentS} s`) : notOpened());
-    } else if (silentS >= (this.isAwaited ? QUIET_ANSWER_S : QUIET_GATEWAY_S)) this.tellQuiet(true);
+    } else if (silentS >= (this.isAwaited ? QUIET_ANSWER_S : QUIET_GATEWAY_S)) this.reportQuiet(true);
   }
 
-  private tellQuiet(isQuiet: boolean): void {
+  private reportQuiet(isQuiet: boolean): void {
     if (isQuiet === this.isQuiet) return;
     this.isQuiet = isQuiet;
     this.handlers.onQuiet?.(isQuiet);

@@ -68,8 +68,8 @@ function floatsOf(head: DataView, buffer: ArrayBuffer, begin: number): Float32Ar
 }
 
 /**
- * `bytes`, a field of `frame`'s message, as float32: in place where the frame tells that it lies so, else copied. Throws where
- * its length is no multiple of 4.
+ * `bytes`, a field of `frame`'s message, as float32: in place where the frame's floats are these bytes, else copied. Throws
+ * where its length is not a multiple of 4.
  */
 export function asFloats(frame: Frame, bytes: Uint8Array): Float32Array {
   const floats = frame.floats;

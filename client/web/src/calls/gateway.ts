@@ -87,13 +87,13 @@ export class Gateway {
     const onBegin = (headers: Record<string, string>) => this.routes.learn(session, headers[NODE_HEADER] ?? "");
     const onEnd = (ended: CallError | null) => {
       const error = ended === null ? null : this.routes.failed(session, route[NODE_HEADER] ?? "", ended);
-      if (error?.code === Code.Unauthenticated) void this.refused(error, token, (told) => handlers.onEnd(told));
-      else if (error?.reason === NOT_OPENED) void this.explained(error).then((told) => handlers.onEnd(told));
+      if (error?.code === Code.Unauthenticated) void this.refused(error, token, (refusal) => handlers.onEnd(refusal));
+      else if (error?.reason === NOT_OPENED) void this.explained(error).then((explanation) => handlers.onEnd(explanation));
       else handlers.onEnd(error);
     };
     const metadata = { ...this.bearer.headers, ...options?.metadata, ...route };
-    const told = { onBegin, onMessage: (message: MessageShape<M["output"]>, frame: Frame) => handlers.onMessage(message, frame), onQuiet: (isQuiet: boolean) => handlers.onQuiet?.(isQuiet), onEnd };
-    return new CallSocket(this.sockets, method, told, { patience: this.patienceOf(method.name), ...options, metadata });
+    const routed = { onBegin, onMessage: (message: MessageShape<M["output"]>, frame: Frame) => handlers.onMessage(message, frame), onQuiet: (isQuiet: boolean) => handlers.onQuiet?.(isQuiet), onEnd };
+    return new CallSocket(this.sockets, method, routed, { patience: this.patienceOf(method.name), ...options, metadata });
   }
 
   private patienceOf(method: string): Patience {

@@ -42,9 +42,9 @@ export function withRoutes(routes: SessionRoutes, clock: RepetitionClock = BROWS
       if (node === "") request.header.delete(NODE_HEADER);
       else request.header.set(NODE_HEADER, node);
       const onError = (thrown: unknown) => {
-        const told = request.signal.aborted ? thrown : unlessCancelled(thrown);
-        routes.failed(session, node, toCallError(told));
-        return told;
+        const reported = request.signal.aborted ? thrown : unlessCancelled(thrown);
+        routes.failed(session, node, toCallError(reported));
+        return reported;
       };
       try {
         const response = await (isQuick ? answeredWithin(attemptMs, request.signal, (signal) => next({ ...request, signal })) : next(request));

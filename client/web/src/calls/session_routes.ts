@@ -31,7 +31,7 @@ export class SessionRoutes {
 
   constructor(private readonly now: () => number = () => performance.now()) {}
 
-  /** Whether any server has told its name. */
+  /** Whether any server has reported its name. */
   get isCluster(): boolean {
     return this.hasHeard;
   }
@@ -47,7 +47,7 @@ export class SessionRoutes {
     return node === "" ? {} : { [NODE_HEADER]: node };
   }
 
-  /** `node` answers for the session; "": it has told no name. */
+  /** `node` answers for the session; "": it has not reported a name. */
   learn(session: string, node: string): void {
     if (!NODE_NAME.test(node)) return;
     this.hasHeard = true;

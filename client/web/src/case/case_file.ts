@@ -37,7 +37,7 @@ export interface CaseFile {
   materialRanges: MaterialRanges | null;
   /** Vertices of the tet mesh that surfaces follow, the probes, and where tissue may lift off, rising: what a drag asks for. */
   followed: Int32Array;
-  /** For each handle three of its vertices by which others see where it is, or null where it has none that tell. */
+  /** For each handle three of its vertices by which others see where it is, or null where no three show that. */
   probes: ([number, number, number] | null)[];
   /** Of all vertices of the tet mesh, #V by 3, at rest, rounded to float32 as frames are. */
   restPositions: Float32Array;

@@ -18,7 +18,7 @@ const CHUNK_BIN = 0x004e4942;
 const HEADER_BYTES = 12;
 const CHUNK_HEAD_BYTES = 8;
 
-/** How much of a file tells where its JSON ends. */
+/** How much of a file shows where its JSON ends. */
 export const PREFIX_BYTES = HEADER_BYTES + CHUNK_HEAD_BYTES;
 
 const FLOAT32 = 5126;

@@ -26,7 +26,7 @@ export interface EvaluationHost {
   readonly hasWorkers: boolean;
   /** In the page it is answered before this returns. */
   ask(poses: readonly Pose[], number: number): void;
-  /** As of AnswerEvaluator; null, too, where the host was closed. Tells nothing to who listens for answers. */
+  /** As of AnswerEvaluator; null, too, where the host was closed. Listeners for answers receive nothing. */
   valuesAt(poses: readonly Pose[], kind: ValueKind): Promise<Float32Array | null>;
   close(): void;
 }

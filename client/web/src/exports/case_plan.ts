@@ -76,7 +76,7 @@ function gradientFieldJson(settings: GradientFieldSettings | undefined): object 
 }
 
 /**
- * A case has a number for the tissue of each tet, a plan needs an array of the mesh that tells them apart: the stiffness does so
+ * A case has a number for the tissue of each tet, a plan needs an array of the mesh that distinguishes them: the stiffness does so
  * where each tissue has one whole number of Pa of its own. Null where it does not. Rejects as the case's source does.
  */
 export async function plannedRanges(file: CaseFile): Promise<PlannedRanges> {

@@ -59,13 +59,13 @@ export interface NumbersAtRest {
 }
 
 /** What the export contains of a plan. */
-export type ToldPlan = ShownFace & Pick<Workbench, "answer" | "caseName" | "model" | "modelInfo" | "plan"> & { stored: Pick<StoredPredictions, "all"> };
+export type ExportedPlan = ShownFace & Pick<Workbench, "answer" | "caseName" | "model" | "modelInfo" | "plan"> & { stored: Pick<StoredPredictions, "all"> };
 
 /**
  * A plan that `tissueform plan check` and `deform` take (docs/plan-format.md), with what the planner shows of it. Movements and
  * measures are of the plan's face, and left out while another one is shown. `ranges`: what plannedRanges gives.
  */
-export function planDocument(bench: ToldPlan, atRest: NumbersAtRest, ranges: PlannedRanges = null): string {
+export function planDocument(bench: ExportedPlan, atRest: NumbersAtRest, ranges: PlannedRanges = null): string {
   const { manifest, materialRanges } = bench.file;
   const poses = bench.plan.poses();
   const byHandle = new Map(bench.plan.handles.map(({ name }, index) => [name, poses[index]]));
@@ -97,7 +97,7 @@ export function planDocument(bench: ToldPlan, atRest: NumbersAtRest, ranges: Pla
   return JSON.stringify(document, null, 2).replace(/\[\n[\s\d.,eE+-]+\]/g, (numbers) => numbers.replace(/\s+/g, ""));
 }
 
-function movements(bench: ToldPlan, bands: NumbersAtRest["movements"]): object[] {
+function movements(bench: ExportedPlan, bands: NumbersAtRest["movements"]): object[] {
   const { landmarks } = bench.file.manifest;
   return landmarkMovements(bench).map(({ bandMm, ...movement }, index) => {
     const total = bands?.[index]?.totalMm;

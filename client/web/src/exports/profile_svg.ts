@@ -36,7 +36,7 @@ export class ProfileDrawing {
     this.before = this.skins.flatMap(({ surface, triangles }) => cutProfile({ positions: surfaces[surface].positions, triangles }, this.frame));
   }
 
-  /** As the face is shown now; the nose to the right unless told. */
+  /** As the face is shown now; the nose to the right by default. */
   draw(isNoseLeft = false): SVGSVGElement {
     const points = (at: (name: string) => ProfilePoint | null): Points =>
       new Map(FACE_LANDMARKS.flatMap(({ name }): [string, ProfilePoint][] => {

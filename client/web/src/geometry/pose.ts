@@ -85,7 +85,7 @@ export function toPose(move: SegmentMove, pivotMm: Vector, frame: HeadFrame): Po
   };
 }
 
-/** The same movement of every point, told about `pivotMm`; whole turns are lost. */
+/** The same movement of every point, expressed about `pivotMm`; whole turns are lost. */
 export function toMove(pose: Pose, pivotMm: Vector, frame: HeadFrame): SegmentMove {
   const axes = headAxes(frame);
   const rotation = multiply(axes, multiply(fromRotationVector(pose.rotationVector), transpose(axes)));

@@ -4,7 +4,7 @@
 import { type Matrix, type Vector, apply, cross, multiply, norm, scaled, subtract, toRotationVector, transpose } from "./rotation";
 import type { Pose } from "./pose";
 
-// Who follows a drag is sent positions and no poses. Three vertices of a segment tell where all of it is.
+// Followers of a drag receive positions and not poses. Three vertices of a segment show where all of it is.
 
 const SMALLEST_SPREAD_MM = 1;
 

@@ -9,7 +9,7 @@ import { type Vector, add, apply, cross, dot, fromRotationVector, norm, scaled, 
 // How far upper and lower teeth lie from each other: of each vertex of one the nearest vertex of the other, and how far along the
 // normal there. Judged at vertices, which lie about half a millimetre apart in a case: a hint for the eye, no articulator.
 
-/** Teeth further apart tell no distance. */
+/** Teeth further apart have no distance. */
 export const MOST_GAP_MM = 6;
 /** Nearer than this they touch. */
 export const CONTACT_MM = 0.25;

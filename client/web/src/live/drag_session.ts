@@ -23,7 +23,7 @@ export interface DisplayedFrame {
   frame: DeformFrame;
   /** Three of each vertex of the configuration, mm. */
   positions: Float32Array;
-  /** One of each vertex, mm; null where the frame tells none. */
+  /** One of each vertex, mm; null where the frame has none. */
   uncertainty: Float32Array | null;
   /** From sending its pose to now. */
   roundTripMs: number;
@@ -31,7 +31,7 @@ export interface DisplayedFrame {
   posesBehind: number;
 }
 
-/** What a drag tells its owner. */
+/** What a drag reports to its owner. */
 export interface DragListener {
   onStarted(started: DeformStarted): void;
   /** `used` is to be called once the picture was shown: the server waits for it. */
@@ -63,7 +63,7 @@ export class DragSession {
   private isClosed = false;
   private isStarted = false;
   /** The token that the open call stands on. */
-  private toldToken = "";
+  private sentToken = "";
 
   private sequence = 0n;
   private poses: HandlePose[] | null = null;
@@ -115,7 +115,7 @@ export class DragSession {
   private connect(): void {
     this.isStarted = false;
     [this.sent, this.answered, this.unused, this.isAway] = [0n, 0n, 0, false];
-    this.toldToken = this.gateway.bearer.token;
+    this.sentToken = this.gateway.bearer.token;
     const call = this.gateway.open(
       DeformService.method.deform,
       {
@@ -131,8 +131,8 @@ export class DragSession {
 
   // The open drag stands on the new token from now on.
   private renew(token: string): void {
-    if (token === "" || token === this.toldToken || !this.isStarted) return;
-    this.toldToken = token;
+    if (token === "" || token === this.sentToken || !this.isStarted) return;
+    this.sentToken = token;
     this.call?.send(create(DeformRequestSchema, { message: { case: "token", value: token } }));
   }
 

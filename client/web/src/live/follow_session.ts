@@ -122,14 +122,14 @@ export class FollowSession {
       if (watch === this.watch) this.used = frame.number;
       this.acknowledge(watch, frame.number);
     };
-    const tell = () => {
+    const deliver = () => {
       this.isOfDrag = frame.origin === WatchOrigin.DRAG;
       this.awaitsDrag = false;
       this.listener.onPicture(picture, used);
     };
     this.stopWaiting?.();
-    if (this.awaitsDrag && frame.origin !== WatchOrigin.DRAG) this.stopWaiting = this.timer(tell, DRAG_RETURNS_MS);
-    else tell();
+    if (this.awaitsDrag && frame.origin !== WatchOrigin.DRAG) this.stopWaiting = this.timer(deliver, DRAG_RETURNS_MS);
+    else deliver();
   }
 
   // A watch that has ended needs no acknowledgment; its end arrives by itself. The server waits for one that was lost,

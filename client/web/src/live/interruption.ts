@@ -19,7 +19,7 @@ export type Connection =
 /** Longer than a lease, a preparation and some tries. */
 const MOVING_MS = 30_000;
 
-/** Tells a call that broke off as a move where there is a cluster, as long as that is likely, and by its error otherwise. */
+/** Reports a call that broke off as a move where there is a cluster, as long as that is likely, and by its error otherwise. */
 export class Interruption {
   private since: number | null = null;
 

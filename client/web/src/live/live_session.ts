@@ -164,7 +164,7 @@ export class LiveSession {
         this.listener.onStarted(configuration);
       },
       onPicture: (picture, used) => this.listener.onPicture(picture, used),
-      onNotice: (notice) => this.tell(notice),
+      onNotice: (notice) => this.notify(notice),
       onWaiting: (isWaiting) => this.listener.onConnection({ kind: isWaiting ? "waiting" : "live" }),
       onBroken: (error) => this.listener.onConnection(this.interruption.connection(error)),
       onEnd: (error) => this.dragEnded(error),
@@ -187,9 +187,9 @@ export class LiveSession {
     await this.connect(false);
   }
 
-  private tell({ notice }: DeformNotice): void {
+  private notify({ notice }: DeformNotice): void {
     if (notice.case === "followers") this.listener.onFollowers(notice.value.count);
-    // In a cluster another server goes on with it, of which the connection's state tells.
+    // In a cluster another server goes on with it, which the connection's state shows.
     if (notice.case === "draining" && !this.gateway.routes.isCluster) this.listener.onNotice("The server is shutting down. Your poses are kept; the page reconnects automatically.");
     if (notice.case === "evicted") this.listener.onNotice("The session was evicted from the server's memory and is being prepared again.");
     if (notice.case === "restored") this.listener.onNotice("The session is back in the server's memory.");

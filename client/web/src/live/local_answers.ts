@@ -35,8 +35,8 @@ export class LocalAnswers {
   private isStopped = false;
   private poses: readonly Pose[] | null = null;
   private asked = 0;
-  /** Of the newest question whose answer was covered and told. */
-  private told = -Infinity;
+  /** Of the newest question whose answer was covered and shown. */
+  private shown = -Infinity;
 
   constructor(
     private readonly gateway: Pick<Gateway, "deform">,
@@ -59,7 +59,7 @@ export class LocalAnswers {
       const error = toCallError(thrown);
       if (error.code === Code.Canceled) return;
       // What it has stays good while the server is away: the next start of the drag asks again.
-      if (error.isPassing && this.host !== null) return this.tell("covered");
+      if (error.isPassing && this.host !== null) return this.report("covered");
       this.drop();
       this.listener.onState({ kind: "failed", text: messageOf(thrown) });
     }
@@ -72,7 +72,7 @@ export class LocalAnswers {
     this.host?.close();
     this.host = null;
     this.columns = null;
-    this.told = -Infinity;
+    this.shown = -Infinity;
     if (!this.isStopped) this.listener.onState({ kind: "none" });
   }
 
@@ -128,8 +128,8 @@ export class LocalAnswers {
   }
 
   /** How many poses have been asked for since the one whose answer the page has shown; infinite where it has shown none. */
-  get posesSinceTold(): number {
-    return this.asked - this.told;
+  get posesSinceShown(): number {
+    return this.asked - this.shown;
   }
 
   private async fetch(configuration: DeformConfiguration, signal: AbortSignal): Promise<void> {
@@ -146,7 +146,7 @@ export class LocalAnswers {
     this.host?.close();
     this.host = host;
     this.columns = columns;
-    this.tell("covered");
+    this.report("covered");
     if (this.poses !== null) host.ask(this.poses, this.asked);
   }
 
@@ -157,13 +157,13 @@ export class LocalAnswers {
 
   private take(evaluation: Evaluation, number: number): void {
     const { coverage } = evaluation;
-    this.tell(coverage);
-    if (coverage === "beyond" || number <= this.told) return;
-    this.told = number;
+    this.report(coverage);
+    if (coverage === "beyond" || number <= this.shown) return;
+    this.shown = number;
     this.listener.onEvaluation(evaluation);
   }
 
-  private tell(coverage: Evaluation["coverage"]): void {
+  private report(coverage: Evaluation["coverage"]): void {
     if (this.host === null) return;
     const { place, hasWorkers } = this.host;
     this.listener.onState({ kind: "ready", place, hasWorkers, coverage });

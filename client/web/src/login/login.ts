@@ -61,7 +61,7 @@ export class Login {
     return this.current;
   }
 
-  /** Tells `listener` now, and of every change. */
+  /** Notifies `listener` now, and of every change. */
   watch(listener: (state: LoginState) => void): void {
     this.listeners.push(listener);
     listener(this.current);

@@ -18,7 +18,7 @@ export interface User {
   idToken: string;
 }
 
-/** What a login needs of an identity provider; tests have their own. All reject as `loginSentence` tells. */
+/** What a login needs of an identity provider; tests have their own. All reject as `loginSentence` describes. */
 export interface Provider {
   /** Where the user is asked; `isSilent`: is not asked, and the answer is an error where that would be needed. */
   authorizationUrl(redirect: Redirect, redirectUri: string): Promise<string>;
@@ -35,8 +35,8 @@ export function newSecrets(): Pick<Redirect, "state" | "nonce" | "verifier"> {
 }
 
 const DEADLINE_MS = 10_000;
-/** Of a token whose lifetime the provider does not tell. */
-const UNTOLD_LIFETIME_S = 300;
+/** Of a token whose lifetime the provider does not report. */
+const DEFAULT_LIFETIME_S = 300;
 
 /** OpenID Connect's code flow with PKCE, as a public client. What the provider says of itself is asked for once. */
 export class OidcProvider implements Provider {
@@ -125,7 +125,7 @@ function tokensOf(response: oauth.TokenEndpointResponse): Tokens {
   return {
     accessToken: response.access_token,
     refreshToken: response.refresh_token ?? null,
-    lifetimeMs: 1000 * (response.expires_in ?? UNTOLD_LIFETIME_S),
+    lifetimeMs: 1000 * (response.expires_in ?? DEFAULT_LIFETIME_S),
   };
 }
 

@@ -28,7 +28,7 @@ export interface MeasureDefinition {
 
 const LEGAN = "Legan and Burstone 1980";
 const RICKETTS = "Ricketts 1968";
-/** Shorter arms of an angle tell nothing. */
+/** Shorter arms of an angle do not count. */
 const LEAST_ARM_MM = 1;
 /** A nose tip that is less in front of chin and lip than this does not count. */
 const LEAST_NOSE_MM = 3;

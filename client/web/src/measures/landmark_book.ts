@@ -58,7 +58,7 @@ export class LandmarkBook {
 
   suggest(found: Anchors): void {
     this.found = found;
-    this.tell();
+    this.notify();
   }
 
   onChange(listener: () => void): void {
@@ -105,12 +105,12 @@ export class LandmarkBook {
 
   undo(): void {
     this.history.undo();
-    this.tell();
+    this.notify();
   }
 
   redo(): void {
     this.history.redo();
-    this.tell();
+    this.notify();
   }
 
   save(): SavedLandmarks {
@@ -127,7 +127,7 @@ export class LandmarkBook {
       return anchor === null || landmark === undefined || this.problem(landmark, anchor) !== "" ? [] : [[landmark.name, anchor]];
     });
     this.history = new History<State>({ placed: new Map(anchors), own: readOwnMeasures(own) });
-    this.tell();
+    this.notify();
   }
 
   /** The nearest point of a surface that the landmark may lie on; null where none is within 2 mm. */
@@ -158,10 +158,10 @@ export class LandmarkBook {
 
   private set(state: State): void {
     this.history.add(state);
-    this.tell();
+    this.notify();
   }
 
-  private tell(): void {
+  private notify(): void {
     this.listeners.forEach((listener) => listener());
   }
 }

@@ -23,7 +23,7 @@ export const DEVIATIONS = {
 
 /** Of the normal distribution: 95 of 100 cases are within so many standard deviations. */
 const NORMAL_95 = 1.96;
-/** Measures are nearly linear over this part of a standard deviation, and positions of single precision still tell it. */
+/** Measures are nearly linear over this part of a standard deviation, and positions of single precision still resolve it. */
 const STEP = 0.1;
 /** The front of a segment is the mean of this part of its vertices, the foremost ones. */
 const FRONT_PART = 10;

@@ -15,7 +15,7 @@ import { draftsList } from "./drafts_list";
 /** The first page: the server's cases, and a place where a case file is dropped. */
 export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, onNewPlan: (draft: BuildDraft | null) => void, account: HTMLElement | null): HTMLElement {
   const list = el("ul", { class: "cases" });
-  const told = el("p", { class: "told", attributes: { role: "status" } });
+  const status = el("p", { class: "told", attributes: { role: "status" } });
   const problem = el("p", { class: "problem", attributes: { role: "alert" } });
   const progress = el("progress", { attributes: { max: "1", "aria-label": "Progress" } });
   progress.hidden = true;
@@ -23,7 +23,7 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, onNew
   const showList = async () => {
     try {
       list.replaceChildren(...(await listCases(gateway)).map((entry) => caseItem(entry, onOpen)));
-      told.textContent = list.childElementCount === 0 ? "The server has no cases yet." : "";
+      status.textContent = list.childElementCount === 0 ? "The server has no cases yet." : "";
     } catch (thrown) {
       problem.textContent = `The cases cannot be listed. ${messageOf(thrown)}`;
     }
@@ -33,12 +33,12 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, onNew
     progress.hidden = false;
     try {
       onOpen(await bringIn(gateway, file, (text, share) => {
-        told.textContent = text;
+        status.textContent = text;
         progress.value = share;
       }));
     } catch (thrown) {
       problem.textContent = messageOf(thrown);
-      told.textContent = "";
+      status.textContent = "";
     } finally {
       progress.hidden = true;
     }
@@ -58,7 +58,7 @@ export function casesPage(gateway: Gateway, onOpen: (entry: Case) => void, onNew
       draftsList(gateway, onNewPlan, (text) => (problem.textContent = text)),
       newPlan,
       dropZone((file) => void take(file)),
-      told,
+      status,
       progress,
       problem,
       el("p", { class: "quiet", text: "Not a medical device." }),
@@ -100,9 +100,9 @@ function dropZone(onFile: (file: File) => void): HTMLElement {
 }
 
 /** A file is read in full before it is sent: the server keeps bytes, it does not look into them. */
-async function bringIn(gateway: Gateway, file: File, tell: (text: string, share: number) => void): Promise<Case> {
+async function bringIn(gateway: Gateway, file: File, onProgress: (text: string, share: number) => void): Promise<Case> {
   const source = fileSource(file);
-  const opened = await openCase(source, (done, total) => tell("Reading the file", done / total));
+  const opened = await openCase(source, (done, total) => onProgress("Reading the file", done / total));
   const name = `cases/${await sha256Of(file)}`;
   try {
     return await gateway.cases.getCase({ name });
@@ -111,5 +111,5 @@ async function bringIn(gateway: Gateway, file: File, tell: (text: string, share:
     if (error.code !== Code.NotFound) throw error;
   }
   const sha256 = name.replace("cases/", "");
-  return uploadCase(gateway, source, sha256, opened.manifest.title, (share) => tell("Sending the case", share));
+  return uploadCase(gateway, source, sha256, opened.manifest.title, (share) => onProgress("Sending the case", share));
 }

@@ -51,7 +51,7 @@ interface FollowerListener {
   onNotice(text: string): void;
 }
 
-/** Lays what a watch tells upon the head. Where bone is it learns from three vertices of each segment, else from committed poses. */
+/** Lays what a watch reports upon the head. Where bone is it learns from three vertices of each segment, else from committed poses. */
 export class Follower {
   /** Of the newest picture, as it came. */
   positions = new Float32Array();

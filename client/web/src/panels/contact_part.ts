@@ -30,7 +30,7 @@ export function contactPart(bench: Workbench, choose: (choice: ContactChoice) =>
 
 /** Points where tissue presses, and the same in words. */
 function touchPart(bench: Workbench): HTMLElement[] {
-  const told = el("p", { class: "quiet", attributes: { role: "status" } });
+  const status = el("p", { class: "quiet", attributes: { role: "status" } });
   const shows = button("Show contact", () => {
     shows.setAttribute("aria-pressed", String(shows.getAttribute("aria-pressed") !== "true"));
     void show();
@@ -38,13 +38,13 @@ function touchPart(bench: Workbench): HTMLElement[] {
   const show = async () => {
     const touch = await bench.touch();
     const text = describeTouch(touch) + describeSeal(sealedPairs(bench.file), await bench.sealState());
-    if (told.textContent !== text) told.textContent = text;
+    if (status.textContent !== text) status.textContent = text;
     const isShown = touch !== null && bench.comparison.value === null && bench.bite.value === null && shows.getAttribute("aria-pressed") === "true";
     bench.view.setPoints("contact", isShown ? touch.points : [], isShown ? touch.colors : undefined);
   };
   const later = throttleToFrame(() => void show());
   for (const signal of [bench.answer, bench.comparison, bench.bite, bench.localState]) (signal as Signal<unknown>).watch(later);
-  return [el("div", { class: "buttons" }, [shows]), told, el("p", { class: "quiet", text: NO_BAND })];
+  return [el("div", { class: "buttons" }, [shows]), status, el("p", { class: "quiet", text: NO_BAND })];
 }
 
 /** What became of the seal, with a space before; nothing of free lips. */

@@ -108,7 +108,7 @@ export interface Choice<T> {
   label: string;
 }
 
-/** A list of which one is chosen; `choose` shows another choice without telling. */
+/** A list of which one is chosen; `choose` shows another choice without notifying. */
 export function select<T>(label: string, choices: Choice<T>[], onChoose: (value: T) => void): { element: HTMLElement; set(choices: Choice<T>[], index: number): void } {
   const id = newId("select");
   let current = choices;

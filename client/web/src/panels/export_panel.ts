@@ -12,7 +12,7 @@ import { movingFilePart } from "./moving_file_part";
 
 /** What is shown, as files. Names of files hold nothing of the patient. */
 export function exportPanel(bench: Workbench): HTMLElement {
-  const tell = (run: () => void | Promise<void>) => async () => {
+  const reportingErrors = (run: () => void | Promise<void>) => async () => {
     try {
       await run();
     } catch (thrown) {
@@ -34,11 +34,11 @@ export function exportPanel(bench: Workbench): HTMLElement {
   };
   return section("Export", [
     el("div", { class: "buttons" }, [
-      button("Face STL", tell(() => save("tissueform-face.stl", "model/stl", toStl(exportedSurfaces(bench, "skin"), remark())))),
-      button("All STL", tell(() => save("tissueform-all.stl", "model/stl", toStl(exportedSurfaces(bench, "all"), remark())))),
-      button("Face PLY", tell(() => save("tissueform-face.ply", "application/octet-stream", toPly(exportedSurfaces(bench, "skin"), provenanceLines(bench))))),
-      button("Picture", tell(png)),
-      button("Plan JSON", tell(plan)),
+      button("Face STL", reportingErrors(() => save("tissueform-face.stl", "model/stl", toStl(exportedSurfaces(bench, "skin"), remark())))),
+      button("All STL", reportingErrors(() => save("tissueform-all.stl", "model/stl", toStl(exportedSurfaces(bench, "all"), remark())))),
+      button("Face PLY", reportingErrors(() => save("tissueform-face.ply", "application/octet-stream", toPly(exportedSurfaces(bench, "skin"), provenanceLines(bench))))),
+      button("Picture", reportingErrors(png)),
+      button("Plan JSON", reportingErrors(plan)),
       caseButton(bench),
     ]),
     el("p", { class: "quiet", text: "In mm, LPS, as shown. Plan JSON uses Case file as its mesh: save both in one folder. Every file states: not a medical device." }),

@@ -34,12 +34,12 @@ function openingPart(bench: Workbench): HTMLElement {
   if (hinge === null || lowerJawHandles(bench.file).length === 0) {
     return el("p", { class: "quiet", text: "The case has no mandible segment, or no information about its condyles." });
   }
-  const told = el("p", { attributes: { role: "status" } });
+  const status = el("p", { attributes: { role: "status" } });
   const control = slider("Jaw rotation (hinge axis)", { least: 0, most: MOST_OPENING_DEG, step: 0.5, value: 0 }, (value) => bench.open(value));
   const show = () => {
     const mm = incisorDistanceMm(bench.file, bench.shownPoses);
     const { degrees } = bench.jaw;
-    told.textContent = `${degrees === 0 ? "Closed as planned" : `Open by ${formatNumber(degrees)}°`}${mm === null ? "" : `, ${formatNumber(mm)} mm between the incisors`}.`;
+    status.textContent = `${degrees === 0 ? "Closed as planned" : `Open by ${formatNumber(degrees)}°`}${mm === null ? "" : `, ${formatNumber(mm)} mm between the incisors`}.`;
     control.value = String(degrees);
     control.setAttribute("aria-valuetext", `${formatNumber(degrees)} degrees`);
   };
@@ -48,7 +48,7 @@ function openingPart(bench: Workbench): HTMLElement {
   const how = hinge.source === "landmarks" ? "the case’s landmarks of the condyles" : "the upper back ends of the lower jaw, for the case names no condyles";
   return el("div", { class: "landmark-part" }, [
     el("label", { class: "inline" }, ["Opening", control]),
-    told,
+    status,
     el("p", { class: "quiet", text: `A hinge through ${how} (blue points). The condyles do not translate; the opening is not part of the plan. It is an illustration, not a prediction: beyond about 10° no model bears the tissue around the ramus.` }),
     el("div", { class: "buttons" }, [button("Close", () => bench.open(0))]),
   ]);
@@ -68,7 +68,7 @@ function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
   if (below.length === 0 || above.length === 0) {
     return { element: el("p", { class: "quiet", text: "The case has no teeth of both jaws." }), off: () => {} };
   }
-  const told = el("p", { attributes: { role: "status" } });
+  const status = el("p", { attributes: { role: "status" } });
   let test: ToothContact | null = null;
   let timer: ReturnType<typeof setTimeout> | undefined;
   const isOn = () => toggle.getAttribute("aria-pressed") === "true";
@@ -78,13 +78,13 @@ function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
     const contact = test.find(bench.shownPoses);
     bench.view.head.colorSurfaces([...above, ...below], [...contact.upperMm, ...contact.lowerMm].map(distanceColors));
     bench.view.stage.invalidate();
-    told.textContent = contactText(contact);
+    status.textContent = contactText(contact);
   };
   const set = (isShown: boolean) => {
     toggle.setAttribute("aria-pressed", String(isShown));
     bench.showBite(isShown ? LEGEND : null);
     if (!isShown) bench.view.head.colorSurfaces([...above, ...below], null);
-    told.textContent = "";
+    status.textContent = "";
     bench.view.stage.invalidate();
     find();
   };
@@ -93,7 +93,7 @@ function bitePart(bench: Workbench): { element: HTMLElement; off(): void } {
     clearTimeout(timer);
     timer = setTimeout(find, SETTLE_MS);
   });
-  return { element: el("div", { class: "landmark-part" }, [el("div", { class: "buttons" }, [toggle]), told]), off: () => isOn() && set(false) };
+  return { element: el("div", { class: "landmark-part" }, [el("div", { class: "buttons" }, [toggle]), status]), off: () => isOn() && set(false) };
 }
 
 function toTeeth({ source }: DrawnSurface): Teeth {

@@ -54,8 +54,8 @@ function localAnswers(bench: Workbench): HTMLElement {
   const start = button("Answer here", () => bench.local.resume(), { attributes: { title: "Answers computed in this page, without waiting for the server" } });
   const show = () => {
     const state = bench.localState.value;
-    const told = describeLocal(state);
-    if (text.textContent !== told) text.textContent = told;
+    const description = describeLocal(state);
+    if (text.textContent !== description) text.textContent = description;
     text.dataset.local = state.kind === "ready" ? state.coverage : state.kind;
     stop.hidden = state.kind !== "fetching" && state.kind !== "ready";
     start.hidden = state.kind !== "stopped" && state.kind !== "failed";

@@ -23,14 +23,14 @@ export function reportPanel(bench: Workbench): HTMLElement {
 /** What else is on the page is not printed. */
 function showReport(sheet: HTMLElement): void {
   // The planner's own line of words lies below the report.
-  const told = el("p", { attributes: { role: "alert" } });
+  const problem = el("p", { attributes: { role: "alert" } });
   const save = async () => {
     const { reportFile } = await pagePart(() => import("../report/report_file"));
     download("tissueform-report.html", new Blob([await reportFile(sheet)], { type: "text/html" }));
   };
-  const html = button("Report HTML", () => void whileBusy(html, save, (thrown) => (told.textContent = messageOf(thrown))));
+  const html = button("Report HTML", () => void whileBusy(html, save, (thrown) => (problem.textContent = messageOf(thrown))));
   const buttons = [button("Print or save as PDF", () => print()), html, button("Back to the plan", () => close())];
-  const page = el("main", { class: "report-page", attributes: { "aria-label": "Report" } }, [el("div", { class: "buttons" }, [...buttons, told]), sheet]);
+  const page = el("main", { class: "report-page", attributes: { "aria-label": "Report" } }, [el("div", { class: "buttons" }, [...buttons, problem]), sheet]);
   page.addEventListener("keydown", (event) => event.key === "Escape" && close());
   const close = coverPage(page);
   buttons[0].focus();

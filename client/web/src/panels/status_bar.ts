@@ -96,12 +96,12 @@ function describe(connection: Connection): string {
 
 /** Makes links for who follows, and ends them where the server knows who calls. */
 function linkButtons(links: FollowLinks): HTMLElement {
-  const told = el("span", { class: "quiet", attributes: { role: "status" } });
-  const fail = (thrown: unknown) => (told.textContent = messageOf(thrown));
+  const status = el("span", { class: "quiet", attributes: { role: "status" } });
+  const fail = (thrown: unknown) => (status.textContent = messageOf(thrown));
   const end = button("End links", () => {
     const run = async () => {
       await links.endAll();
-      told.textContent = "all links were revoked";
+      status.textContent = "all links were revoked";
     };
     void whileBusy(end, run, fail);
   });
@@ -110,11 +110,11 @@ function linkButtons(links: FollowLinks): HTMLElement {
     const run = async () => {
       const { url, endsAt } = await links.make();
       const isCopied = await copyText(url);
-      told.textContent = [isCopied ? "copied" : "", endsAt === null ? "" : `until ${timeText(endsAt)}`].filter((part) => part !== "").join(", ");
+      status.textContent = [isCopied ? "copied" : "", endsAt === null ? "" : `until ${timeText(endsAt)}`].filter((part) => part !== "").join(", ");
     };
     void whileBusy(copy, run, fail);
   });
-  return el("span", { class: "links" }, [copy, end, told]);
+  return el("span", { class: "links" }, [copy, end, status]);
 }
 
 const DAY_MS = 24 * 3_600_000;

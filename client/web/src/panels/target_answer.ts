@@ -11,7 +11,7 @@ import { button, collapsible, el } from "./dom";
 /** The result for the targets: reached or missed, what holds back, how well each number is determined; and to accept or reject it. */
 export function targetAnswer(bench: Workbench): HTMLElement {
   const fit = bench.targets;
-  const told = el("div", { class: "target-told", attributes: { role: "status" } });
+  const status = el("div", { class: "target-told", attributes: { role: "status" } });
   const rows = el("tbody");
   const heads = ["Number", "Value", "Determined by targets", "Per mm"].map((text) => el("th", { text, attributes: { scope: "col" } }));
   const caption = el("caption", { text: "Scanner axes. Undetermined parameters move least. Per mm: standard deviation if all targets were off by 1 mm." });
@@ -28,10 +28,10 @@ export function targetAnswer(bench: Workbench): HTMLElement {
     else if (!fit.isAsked) lines.unshift("This is the planned face: drag a target, or type its position.");
     else if (response === null) lines.unshift("The server is preparing answers for these points …");
     else lines.push(`Searched for ${Math.max(1, Math.round(1000 * response.searchSeconds))} ms, answered after ${Math.max(1, Math.round(milliseconds))}; bone moves ${formatNumber(response.movementMm)} mm from rest.`);
-    told.replaceChildren(...lines.map((text) => el("p", { text })));
+    status.replaceChildren(...lines.map((text) => el("p", { text })));
     rows.replaceChildren(...(response?.numbers ?? []).map((number) => numberRow(bench, number)));
   };
-  const box = el("div", { class: "target-answer", attributes: { role: "group", "aria-label": "Result for the targets" } }, [told, details, el("div", { class: "buttons" }, [accept, reject])]);
+  const box = el("div", { class: "target-answer", attributes: { role: "group", "aria-label": "Result for the targets" } }, [status, details, el("div", { class: "buttons" }, [accept, reject])]);
   fit.targets.watch(show);
   fit.fitted.watch(show);
   fit.problem.watch(show);

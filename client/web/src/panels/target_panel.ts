@@ -14,7 +14,7 @@ import { targetAnswer } from "./target_answer";
 const MAX_TARGETS = 16;
 const FIELDS: readonly [keyof Target["move"], string][] = [["forwardMm", "forward"], ["leftMm", "left"], ["upMm", "up"]];
 
-/** The face that is targeted: points and regions of the skin that are pulled or told how far to go, and what bone does for it. */
+/** The face that is targeted: points and regions of the skin that are pulled or given a distance, and what bone does for it. */
 export function targetPanel(bench: Workbench): HTMLElement {
   const fit = bench.targets;
   const targetGizmo = new TargetGizmo(bench);

@@ -23,8 +23,8 @@ const LOWER_NAMES = /^(mandible|chin|lower_jaw|genioplasty)/;
 
 /** Handles that go along when the jaw opens: those that carry landmarks of the lower jaw, or are named so. */
 export function lowerJawHandles({ manifest }: CaseFile): string[] {
-  const told = manifest.landmarks.filter(({ name }) => LOWER_LANDMARKS.includes(name)).map(({ handle }) => handle);
-  return manifest.handles.map(({ name }) => name).filter((name) => told.includes(name) || LOWER_NAMES.test(name));
+  const carriers = manifest.landmarks.filter(({ name }) => LOWER_LANDMARKS.includes(name)).map(({ handle }) => handle);
+  return manifest.handles.map(({ name }) => name).filter((name) => carriers.includes(name) || LOWER_NAMES.test(name));
 }
 
 /** Null where the case has neither landmarks of the condyles nor a segment of the lower jaw. */

@@ -16,7 +16,7 @@ export function parseNumber(text: string, unit: Unit): number | null {
   return Number.isFinite(number) ? number : null;
 }
 
-/** With a sign that is a minus, never "-0.0"; a tenth unless told. */
+/** With a sign that is a minus, never "-0.0"; a tenth by default. */
 export function formatNumber(value: number, decimals = 1): string {
   const text = value.toFixed(decimals);
   return Number(text) === 0 ? (0).toFixed(decimals) : text.replace("-", "−");

@@ -132,7 +132,7 @@ export class Graphics {
     canvas.addEventListener("webglcontextrestored", () => {
       if (canvas !== this.canvas) return;
       this.isReported = false;
-      this.whenBack.splice(0).forEach((tell) => tell());
+      this.whenBack.splice(0).forEach((resume) => resume());
       this.onContext(false);
     });
   }

@@ -9,7 +9,7 @@ const BONE_COLOR = 0xe3dac6;
 const TEETH_COLOR = 0xf4f0e4;
 const GHOST_COLOR = 0x8fb7d9;
 
-/** Colours of segments, told apart by those who see red and green alike (Okabe and Ito), lightened for shading. */
+/** Colours of segments that users with red-green color blindness can distinguish (Okabe and Ito), lightened for shading. */
 export const SEGMENT_COLORS = [0x6fb7e6, 0xf0b54a, 0x3fbf95, 0xd68fb5, 0xe88a52, 0x5a8fd0, 0xe9dc6b] as const;
 
 export function segmentColor(index: number): number {

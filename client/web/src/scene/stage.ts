@@ -15,7 +15,7 @@ const MOST_PIXEL_RATIO = 2;
 const MOST_ATTEMPTS = 3;
 const LOST_AGAIN = "The browser repeatedly loses the graphics card, so no picture was made: close other pages with 3D pictures and try again";
 
-/** What a stage tells its owner. */
+/** What a stage reports to its owner. */
 export interface StageListener {
   /** The camera or the size changed, or something was redrawn. */
   onDrawn(): void;
@@ -104,11 +104,11 @@ export class Stage {
     return this.graphics.restore();
   }
 
-  /** Draws before the browser's next picture; then tells `then`. */
+  /** Draws before the browser's next picture; then calls `then`. */
   invalidate(then?: () => void): void {
     if (then !== undefined) this.afterDrawing.push(then);
     if (!this.isDrawing || this.renderer === null) {
-      this.tellDrawn();
+      this.reportDrawn();
       return;
     }
     if (this.isWaiting) return;
@@ -202,7 +202,7 @@ export class Stage {
       this.light();
       if (this.graphics.render(this.scene, this.camera)) this.drawnCount += 1;
     }
-    this.tellDrawn();
+    this.reportDrawn();
   }
 
   /** The key light comes from above the viewer's left shoulder, wherever the viewer is. */
@@ -210,10 +210,10 @@ export class Stage {
     this.keyLight.position.set(-0.55, 0.75, 1).applyQuaternion(this.camera.quaternion);
   }
 
-  private tellDrawn(): void {
+  private reportDrawn(): void {
     const then = this.afterDrawing;
     this.afterDrawing = [];
-    then.forEach((tell) => tell());
+    then.forEach((call) => call());
     this.listener.onDrawn();
   }
 

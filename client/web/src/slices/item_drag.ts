@@ -15,7 +15,7 @@ export interface Drag {
   cancel?(): void;
 }
 
-/** Told of items that moved; the item has its new place already. */
+/** Receives items that moved; the item has its new place already. */
 export interface ItemListener {
   onPoint(point: DraggablePoint, isDone: boolean): void;
   onPlane(plane: DraggablePlane, isDone: boolean): void;
@@ -45,13 +45,13 @@ function pointDrag(pane: PaneView, scene: SliceScene, { id, position }: Draggabl
   const grip = subtract(position, pane.toPoint(x, y));
   scene.selected = id;
   // The owner may set new points during the drag, so the point is looked up each time.
-  const tell = (place: Vector | null, isDone: boolean) => {
+  const report = (place: Vector | null, isDone: boolean) => {
     const point = scene.points.find((other) => other.id === id);
     if (point === undefined) return;
     if (place !== null) point.position = place;
     listener.onPoint(point, isDone);
   };
-  return { move: (toX, toY) => tell(add(pane.toPoint(toX, toY), grip), false), end: () => tell(null, true) };
+  return { move: (toX, toY) => report(add(pane.toPoint(toX, toY), grip), false), end: () => report(null, true) };
 }
 
 function grabPlane(pane: PaneView, scene: SliceScene, plane: DraggablePlane, x: number, y: number, reachPx: number, listener: ItemListener): Drag | null {
@@ -69,13 +69,13 @@ type PlaneChange = (pane: PaneView, from: Vector, to: Vector, plane: Pick<Dragga
 function planeDrag(pane: PaneView, scene: SliceScene, { id, point, normal }: DraggablePlane, x: number, y: number, change: PlaneChange, listener: ItemListener): Drag {
   const from = pane.toPoint(x, y);
   scene.selected = id;
-  const tell = (to: Vector | null, isDone: boolean) => {
+  const report = (to: Vector | null, isDone: boolean) => {
     const plane = scene.planes.find((other) => other.id === id);
     if (plane === undefined) return;
     if (to !== null) Object.assign(plane, change(pane, from, to, { point, normal }));
     listener.onPlane(plane, isDone);
   };
-  return { move: (toX, toY) => tell(pane.toPoint(toX, toY), false), end: () => tell(null, true) };
+  return { move: (toX, toY) => report(pane.toPoint(toX, toY), false), end: () => report(null, true) };
 }
 
 /** Along its normal, so that its line in the slice follows the pointer. */

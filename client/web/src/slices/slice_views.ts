@@ -15,7 +15,7 @@ import { type DraggablePlane, type DraggablePoint, type Measurement, type Outlin
 export type { Plane } from "./plane_frame";
 export type { DraggablePlane, DraggablePoint, Outline } from "./slice_scene";
 
-/** Told of what a user moves. `isDone`: at the end of a drag, and at each key. */
+/** Receives what a user moves. `isDone`: at the end of a drag, and at each key. */
 export interface SliceListener {
   onCrosshair?(point: Vector): void;
   onPoint?(id: string, position: Vector, isDone: boolean): void;

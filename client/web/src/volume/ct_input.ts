@@ -121,8 +121,8 @@ function scansOf({ objects, series }: SliceGroup): Candidate[] {
   const [first, ...others] = separateAcquisitions(objects);
   const isEnough = ({ slices }: { slices: readonly DicomHeader[] }) => slices.length >= Math.max(LEAST_SLICES, Math.floor(first.slices.length / 2));
   const notes = series > 1 ? [`${first.slices.length} slices of ${series} series are read as one: they are of one patient, size and orientation, and their places fit.`] : [];
-  for (const { slices, toldBy } of others.filter((other) => !isEnough(other))) {
-    notes.push(`Left out: ${plural(slices.length, "slice")} of another scan among the others (told apart by ${toldBy}).`);
+  for (const { slices, basis } of others.filter((other) => !isEnough(other))) {
+    notes.push(`Left out: ${plural(slices.length, "slice")} of another scan among the others (told apart by ${basis}).`);
   }
   if (first.slices[0].hasEvenFrames) notes.push("The file has no position for each frame: its frames are placed by SpacingBetweenSlices. Check that the head is not upside down.");
   return [{ objects: first.slices, series, notes }, ...others.filter(isEnough).map(({ slices }) => ({ objects: slices, series: 1, notes: [] }))];

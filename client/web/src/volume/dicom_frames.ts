@@ -58,7 +58,7 @@ function evenFrames(data: Tags, file: DicomHeader): DicomHeader[] {
   return Array.from({ length: count }, (_, frame) => ({ ...file, kind: "ct slice" as const, frame, frames: count, hasEvenFrames: true, position: add(first, scaled(step, frame)) }));
 }
 
-/** `file`: the header of a multi-frame file. Empty where it does not tell its frames apart. */
+/** `file`: the header of a multi-frame file. Empty where it does not distinguish its frames. */
 export function framesOf(data: Tags, file: DicomHeader): DicomHeader[] {
   const groups = data.items(GROUPS_OF_FRAMES);
   if (groups.length === 0) return evenFrames(data, file);

@@ -5,16 +5,16 @@ import { dot, norm } from "../geometry/rotation";
 import { normalOf, type DicomHeader } from "./dicom_header";
 import { areAtOnePlace, fitsInto, isRegular, onRegularSteps, sorted, type Placed, type Stack } from "./regular_slices";
 
-// Scans that lie among each other in one series, told apart as core/imaging/ct/slice_acquisitions.h says it.
+// Scans that lie among each other in one series, distinguished as core/imaging/ct/slice_acquisitions.h describes.
 
 /** Slices that were taken together. */
 export interface Acquisition {
   readonly slices: readonly DicomHeader[];
-  /** "acquisition time"; empty where there is one only. */
-  readonly toldBy: string;
+  /** The property that distinguishes it, such as "acquisition time"; empty where there is one only. */
+  readonly basis: string;
 }
 
-/** Of the slices, for places alone to tell. */
+/** Of the slices, for places alone to distinguish scans. */
 const MAX_OFF_PLACE = 0.25;
 const MAX_SCANS = 8;
 /** Interleaved slices of one scan are taken within some seconds. */
@@ -79,13 +79,13 @@ function largestJumps(slices: readonly DicomHeader[], time: Time): number[] {
 
 interface Parting {
   readonly scans: readonly Stack[];
-  readonly toldBy: string;
+  readonly basis: string;
 }
 
 /** All properties that may separate scans, in the order in which they are tried. */
 function* waysOf(slices: readonly DicomHeader[]): Generator<[Labels, string]> {
-  const byTimes = function* (time: Time, toldBy: string): Generator<[Labels, string]> {
-    for (const jumpS of largestJumps(slices, time)) yield [labelsOfJumps(slices, time, jumpS), toldBy];
+  const byTimes = function* (time: Time, basis: string): Generator<[Labels, string]> {
+    for (const jumpS of largestJumps(slices, time)) yield [labelsOfJumps(slices, time, jumpS), basis];
   };
   yield [labelsOf(slices, ({ reconstruction }) => reconstruction), "reconstruction (kernel, voltage or phase)"];
   yield [labelsOfJumps(slices, "seriesTimeS", SERIES_JUMP_S), "series time"];
@@ -102,7 +102,7 @@ function partByPlaces(stack: Stack): Parting | null {
   if (stack.some((placed, i) => i > 0 && areAtOnePlace(stack[i - 1], placed))) return null;
   const inIt = onRegularSteps(stack);
   const scans = [true, false].map((isIn) => stack.filter((_, i) => inIt[i] === isIn));
-  return scans[1].length > MAX_OFF_PLACE * stack.length ? null : { scans, toldBy: "place, off the even steps" };
+  return scans[1].length > MAX_OFF_PLACE * stack.length ? null : { scans, basis: "place, off the even steps" };
 }
 
 function partingOf(slices: readonly DicomHeader[]): Parting | null {
@@ -110,10 +110,10 @@ function partingOf(slices: readonly DicomHeader[]): Parting | null {
   const stack = sorted(slices.map(({ position }, slice) => ({ heightMm: dot(position!, normal), slice })));
   const isInOrder = isRegular(stack);
   const ways: Iterable<[Labels, string]> = isInOrder ? [[labelsOfJumps(slices, "acquisitionTimeS", LATER_S), "acquisition time"]] : waysOf(slices);
-  for (const [labels, toldBy] of ways) {
+  for (const [labels, basis] of ways) {
     if (labels === null) continue;
     const scans = assemble(stack, labels);
-    if (scans.length >= 2 && scans.length <= MAX_SCANS && isRegular(scans[0])) return { scans, toldBy };
+    if (scans.length >= 2 && scans.length <= MAX_SCANS && isRegular(scans[0])) return { scans, basis };
   }
   return isInOrder ? null : partByPlaces(stack);
 }
@@ -125,6 +125,6 @@ function haveHeights(slices: readonly DicomHeader[]): boolean {
 /** Slices of one size and orientation by the scans that they are of, the largest first. */
 export function separateAcquisitions(slices: readonly DicomHeader[]): Acquisition[] {
   const parting = slices.length > 2 && haveHeights(slices) ? partingOf(slices) : null;
-  if (parting === null) return [{ slices, toldBy: "" }];
-  return parting.scans.map((scan) => ({ slices: scan.map(({ slice }) => slices[slice]), toldBy: parting.toldBy }));
+  if (parting === null) return [{ slices, basis: "" }];
+  return parting.scans.map((scan) => ({ slices: scan.map(({ slice }) => slices[slice]), basis: parting.basis }));
 }

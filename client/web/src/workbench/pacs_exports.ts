@@ -15,7 +15,7 @@ const PAGE_SIZE = 200;
 
 /** Which predictions of a case are on their way to the PACS, or there. Hears of it from the server until `close`. */
 export class PacsExports {
-  /** By prediction its newest export; null: the server sends nothing to a PACS, or has not told yet. */
+  /** By prediction its newest export; null: the server sends nothing to a PACS, or has not reported yet. */
   readonly byPrediction = new Signal<ReadonlyMap<string, Export> | null>(null);
 
   private readonly backoff = new Backoff();
@@ -31,7 +31,7 @@ export class PacsExports {
 
   start(): void {
     this.call = this.gateway.open(ExportService.method.watchExports, {
-      onMessage: (message) => (message.export === undefined ? this.told() : this.take([message.export])),
+      onMessage: (message) => (message.export === undefined ? this.refresh() : this.take([message.export])),
       onEnd: (error) => this.broken(error),
     });
     this.call.send(create(WatchExportsRequestSchema));
@@ -67,7 +67,7 @@ export class PacsExports {
   }
 
   // Unfinished exports have come by then; the list shows which others are finished or gone since then.
-  private told(): void {
+  private refresh(): void {
     this.backoff.succeeded();
     this.list().then(
       (all) => {

@@ -16,7 +16,7 @@ export class Signal<T> {
     this.listeners.forEach((listener) => listener(value));
   }
 
-  /** Tells `listener` now, and of every change. */
+  /** Notifies `listener` now, and of every change. */
   watch(listener: (value: T) => void): void {
     this.listeners.push(listener);
     listener(this.current);

@@ -22,7 +22,7 @@ export interface TargetPlace {
 
 /** Skin that follows less than this is beyond what is modelled. */
 const LEAST_SHARE = 0.2;
-/** More of a region tells no more. */
+/** More vertices of a region add no information. */
 const MOST_VERTICES = 2000;
 
 /** At the vertex of the skin that is nearest to the anchor; null where the skin does not move. */

@@ -384,7 +384,7 @@ export class Workbench implements ShownFace {
   }
 
   private show(picture: DisplayedFrame, used: () => void): void {
-    const isTaken = this.newest.takePicture(picture, this.local.posesSinceTold);
+    const isTaken = this.newest.takePicture(picture, this.local.posesSinceShown);
     this.waitingFrom = null;
     this.picture.value = { roundTripMs: picture.roundTripMs, summary: picture.frame.summary ?? null };
     this.answer.value = this.newest.answer;

@@ -44,7 +44,7 @@ describe("pieces", () => {
     expect(cutPieces(labelled, cut("bssro"), up(-100)).volumesMm3[0]).toBe(1000 * 8);
   });
 
-  test("cuts near a structure are told with their distance", () => {
+  test("cuts near a structure are reported with their distance", () => {
     const canal = Float32Array.from([0, 5, 20, 0, 5, 16.5]);
     const cuts = [{ osteotomy: "bssro" as const, planes: [up(15)] }];
     expect(cutsNear(cuts, new Map([["canal", canal]]), 2, 1)).toEqual([{ segment: 0, structure: "canal", distanceMm: 1.5 }]);

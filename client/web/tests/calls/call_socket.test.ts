@@ -48,7 +48,7 @@ test("a good end is no error", () => {
   expect(ends).toEqual([null]);
 });
 
-test("an end with ErrorInfo tells code, message and reason", () => {
+test("an end with ErrorInfo gives code, message and reason", () => {
   const { socket, ends } = open();
   socket.onopen?.();
   const details = [anyPack(ErrorInfoSchema, create(ErrorInfoSchema, { reason: "SESSION_NOT_FOUND", domain: "tissueform" }))];
@@ -58,7 +58,7 @@ test("an end with ErrorInfo tells code, message and reason", () => {
 
 const BY_PROXIES = [Code.Canceled, Code.Unknown, Code.Internal, Code.Unavailable];
 
-test.each(BY_PROXIES)("what the server says counts, whatever code a proxy makes of it (%i)", (code) => {
+test.each(BY_PROXIES)("the server's status overrides the code that a proxy makes of it (%i)", (code) => {
   const end = (said: Code, reason: string) => {
     const { socket, ends } = open();
     const details = [anyPack(ErrorInfoSchema, create(ErrorInfoSchema, { reason, domain: "tissueform" }))];
@@ -85,7 +85,7 @@ test("details that cannot be read do not hide the error", () => {
   expect(ends[0]).toMatchObject({ code: Code.Unavailable, message: "draining", reason: "", isPassing: true });
 });
 
-test("a socket that closes without an end is a passing error, told once", () => {
+test("a socket that closes without an end is a passing error, reported once", () => {
   const { socket, ends } = open();
   socket.onclose?.({ code: 1006, reason: "" });
   socket.onclose?.({ code: 1006, reason: "" });
@@ -128,60 +128,60 @@ test("a cancelled call hears and sends nothing more", () => {
 function timed(patience = new Patience()) {
   const clock = new FakeClock();
   const socket = new FakeSocket();
-  const told: (string | boolean)[] = [];
-  const handlers = { onMessage: () => told.push("message"), onQuiet: (isQuiet: boolean) => told.push(isQuiet), onEnd: (error: CallError | null) => told.push(error?.message ?? "end") };
+  const reported: (string | boolean)[] = [];
+  const handlers = { onMessage: () => reported.push("message"), onQuiet: (isQuiet: boolean) => reported.push(isQuiet), onEnd: (error: CallError | null) => reported.push(error?.message ?? "end") };
   const call = new CallSocket(() => socket, DeformService.method.deform, handlers, { patience, timer: clock.timer });
-  return { clock, socket, told, call };
+  return { clock, socket, reported, call };
 }
 
 test("heartbeats keep a call that says nothing else", () => {
-  const { clock, socket, told } = timed();
+  const { clock, socket, reported } = timed();
   socket.onopen?.();
   expect(socket.start().wantsHeartbeat).toBe(true);
   for (let i = 0; i < 100; ++i) {
     socket.heartbeat();
     clock.pass(3);
   }
-  expect(told).toEqual([]);
+  expect(reported).toEqual([]);
 });
 
 test("a gateway that sends no heartbeat is not taken for dead", () => {
-  const { clock, socket, told } = timed();
+  const { clock, socket, reported } = timed();
   socket.onopen?.();
   clock.pass(1000);
-  expect(told).toEqual([]);
+  expect(reported).toEqual([]);
 });
 
 test("a call whose heartbeats stop ends, as one that passes", () => {
-  const { clock, socket, told } = timed();
+  const { clock, socket, reported } = timed();
   socket.onopen?.();
   socket.heartbeat();
   clock.pass(8);
-  expect(told).toEqual([true, "the server has not answered for 8 s"]);
+  expect(reported).toEqual([true, "the server has not answered for 8 s"]);
   expect(socket.closedWith).toBe(1000);
   clock.pass(100);
-  expect(told).toHaveLength(2);
+  expect(reported).toHaveLength(2);
 });
 
 test("a socket that does not open ends within 8 s", () => {
-  const { clock, told } = timed();
+  const { clock, reported } = timed();
   clock.pass(8);
-  expect(told[told.length - 1]).toBe("the connection to the gateway does not open");
+  expect(reported[reported.length - 1]).toBe("the connection to the gateway does not open");
 });
 
 test("on a line that is slower than the first patience calls get the time that they need, and less again when they last", () => {
   const patience = new Patience();
-  const { clock, socket, told } = timed(patience);
+  const { clock, socket, reported } = timed(patience);
   socket.onopen?.();
   socket.heartbeat();
   clock.pass(8);
-  expect(told).toContain("the server has not answered for 8 s");
+  expect(reported).toContain("the server has not answered for 8 s");
   const next = timed(patience);
   next.socket.onopen?.();
   next.socket.heartbeat();
   next.clock.pass(12);
   next.socket.heartbeat();
-  expect(next.told).toEqual([true, false]);
+  expect(next.reported).toEqual([true, false]);
   expect(patience.seconds).toBe(36);
   for (let i = 0; i < 40; ++i) {
     next.clock.pass(1);

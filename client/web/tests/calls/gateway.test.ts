@@ -94,7 +94,7 @@ test("a stream that is refused passes where there is another token, and ends whe
   expect(second.ends[0]?.code).toBe(Code.Unauthenticated);
 });
 
-test("other ends of a stream are told at once, as they are", () => {
+test("other ends of a stream are reported at once and unchanged", () => {
   const { open } = gateway([]);
   const { socket, ends } = open();
   socket.end(0);

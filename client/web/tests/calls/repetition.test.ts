@@ -87,7 +87,7 @@ test("a session's calls name the server that has answered first", async () => {
   expect(nodes()).toEqual([null, "a"]);
 });
 
-test("who says where the session is, is believed at once, whatever the call", async () => {
+test("a server that names the session's holder redirects any call at once", async () => {
   const { read, remove, asked, nodes } = gateway(failure(14, "SESSION_MOVED", "b"), success("b"), failure(14, "SESSION_MOVED", "c"), success("c"));
   await read();
   await remove();
@@ -111,7 +111,7 @@ test("a wrong node is dropped, and the call goes wherever it goes", async () => 
   expect(nodes()).toEqual(["a", null, "b"]);
 });
 
-test("what only reads, or has an id, is tried again where the server dies", async () => {
+test("calls that only read, or have a request id, are repeated when the server dies", async () => {
   const { read, keep, nodes } = gateway(failure(14), failure(2), success("b"), failure(14), success("b"));
   await read();
   await keep();
@@ -125,7 +125,7 @@ test.each([Code.Canceled, Code.Unknown, Code.Internal, Code.Unavailable])("a rea
   expect(nodes()).toEqual(["a", null]);
 });
 
-test("what this page has ended itself is not tried again, and says nothing of the server", async () => {
+test("a call that this page cancels is not repeated, and does not change the route", async () => {
   const { calls, run, codeOf, asked } = gateway(failure(Code.Canceled));
   calls.routes.learn("s", "a");
   const call = calls.sessions.getSession({ name: "sessions/s" }, { headers: sessionMetadata("sessions/s"), signal: AbortSignal.abort() });
@@ -134,7 +134,7 @@ test("what this page has ended itself is not tried again, and says nothing of th
   expect(calls.routes.nodeOf("s")).toBe("a");
 });
 
-test("what might be done twice says the error", async () => {
+test("a call that might run twice reports the error", async () => {
   const { remove, asked, codeOf } = gateway(failure(14), success(""));
   expect(await codeOf(remove())).toBe(Code.Unavailable);
   expect(asked).toHaveLength(1);
@@ -232,7 +232,7 @@ test("a look that a dead connection swallows is made again over another one, wit
   expect(waitedMs).toEqual([4000, 8000]);
 });
 
-test("where all are dead the reason is told, and nothing is asked for ever", async () => {
+test("where all servers are dead the reason is reported, and the page stops asking", async () => {
   const { read } = gateway(success("a"));
   const waitedMs = hanging(Infinity, success("a"));
   const error = await read().catch((thrown) => toCallError(thrown));
@@ -240,7 +240,7 @@ test("where all are dead the reason is told, and nothing is asked for ever", asy
   expect(waitedMs).toEqual([4000, 8000, 16000]);
 });
 
-test("what does something, or may take long, is not cut short", async () => {
+test("a call that changes something, or may take long, is not cut short", async () => {
   const { remove, keep } = gateway(success("a"));
   for (const call of [remove, keep]) {
     const waitedMs = hanging(Infinity, success("a"));

@@ -56,9 +56,9 @@ test("servers that name a holder which the proxy never reaches end in one error,
   const backoff = new Backoff(() => 0, () => now);
   const turn = (session = "s") => {
     now += backoff.next(routes.failed(session, "", moved("b")));
-    const told = routes.failed(session, "b", WRONG_NODE);
-    now += backoff.next(told);
-    return told;
+    const error = routes.failed(session, "b", WRONG_NODE);
+    now += backoff.next(error);
+    return error;
   };
   const first = Array.from({ length: 40 }, () => turn());
   expect(first.every((error) => error.isPassing)).toBe(true);

@@ -29,11 +29,11 @@ function server(...calls: [messages: number, ending: Ending][]) {
   return { clock, offsets, source };
 }
 
-test("a download tells how far it is", async () => {
+test("a download reports its progress", async () => {
   const { source, offsets } = server([10, "ends"]);
-  const told: number[] = [];
-  expect(await source.read(20, 35, (count) => told.push(count))).toEqual(BYTES.slice(20, 55));
-  expect(told).toEqual([10, 20, 30, 35]);
+  const reported: number[] = [];
+  expect(await source.read(20, 35, (count) => reported.push(count))).toEqual(BYTES.slice(20, 55));
+  expect(reported).toEqual([10, 20, 30, 35]);
   expect(offsets).toEqual([20]);
 });
 
@@ -61,7 +61,7 @@ test("one that stands still goes on over another connection", async () => {
   expect(offsets).toEqual([0, 30]);
 });
 
-test("where no connection brings anything the reason is told", async () => {
+test("where no connection delivers data the reason is reported", async () => {
   const { source, clock } = server([0, "hangs"]);
   const read = source.read(0, 100).catch((error: Error) => error.message);
   for (let tries = 0; tries < 4; ++tries) {
@@ -71,7 +71,7 @@ test("where no connection brings anything the reason is told", async () => {
   expect(await read).toBe("no data from the server for 30 s");
 });
 
-test("progress is told in megabytes and percent", () => {
+test("progress is shown in megabytes and percent", () => {
   expect(formatProgress(0, 5_200_000)).toBe("0.0 of 5.2 MB, 0 %");
   expect(formatProgress(5_199_999, 5_200_000)).toBe("5.2 of 5.2 MB, 99 %");
 });

@@ -36,62 +36,62 @@ class FakeWorker implements WorkerLike {
   }
 
   letOut(): void {
-    this.waiting.splice(0).forEach((message) => this.tell(message));
+    this.waiting.splice(0).forEach((message) => this.deliver(message));
   }
 
   private answer(message: FromWorker): void {
     if (message.kind === "evaluated") this.waiting.push(message);
-    else this.tell(message.kind === "ready" ? { ...message, medianMs: this.medianMs } : message);
+    else this.deliver(message.kind === "ready" ? { ...message, medianMs: this.medianMs } : message);
   }
 
-  private tell(data: FromWorker): void {
+  private deliver(data: FromWorker): void {
     this.onmessage?.call(this as never, { data } as MessageEvent);
   }
 }
 
 function listener() {
-  const told: { number: number; coverage: string; first: number }[] = [];
+  const reported: { number: number; coverage: string; first: number }[] = [];
   const ends: string[] = [];
   const listening: HostListener = {
-    onEvaluation: ({ coverage, positions }, number) => told.push({ number, coverage, first: positions[0] }),
+    onEvaluation: ({ coverage, positions }, number) => reported.push({ number, coverage, first: positions[0] }),
     onEnded: () => ends.push("ended"),
   };
-  return { told, ends, listening };
+  return { reported, ends, listening };
 }
 
-test("what is fast is evaluated in the page, before the question returns", async () => {
+test("fast columns are evaluated in the page, before the question returns", async () => {
   const worker = new FakeWorker(0.5);
-  const { told, listening } = listener();
+  const { reported, listening } = listener();
   const host = await makeHost(BYTES, SHA256, listening, () => worker);
   expect([host.place, host.hasWorkers]).toEqual(["page", true]);
   expect(worker.isTerminated).toBe(true);
   host.ask(CASES[1].poses, 7);
-  expect(told).toHaveLength(1);
-  expect(told[0]).toMatchObject({ number: 7, coverage: "covered" });
-  expect(told[0].first).toBeCloseTo(CASES[1].positionsMm[0], 4);
+  expect(reported).toHaveLength(1);
+  expect(reported[0]).toMatchObject({ number: 7, coverage: "covered" });
+  expect(reported[0].first).toBeCloseTo(CASES[1].positionsMm[0], 4);
 });
 
-test("what is slow is evaluated by the worker, the newest question only", async () => {
+test("slow columns are evaluated by the worker, the newest question only", async () => {
   const worker = new FakeWorker(20);
-  const { told, listening } = listener();
+  const { reported, listening } = listener();
   const host = await makeHost(BYTES, SHA256, listening, () => worker);
   expect(host.place).toBe("worker");
   [1, 2, 3].forEach((number) => host.ask(CASES[number].poses, number));
-  expect(told).toEqual([]);
+  expect(reported).toEqual([]);
   worker.letOut();
   worker.letOut();
-  expect(told.map(({ number }) => number)).toEqual([1, 3]);
-  expect(told[1].first).toBeCloseTo(CASES[3].positionsMm[0], 4);
+  expect(reported.map(({ number }) => number)).toEqual([1, 3]);
+  expect(reported[1].first).toBeCloseTo(CASES[3].positionsMm[0], 4);
   host.close();
   host.ask(CASES[2].poses, 4);
   worker.letOut();
-  expect(told).toHaveLength(2);
+  expect(reported).toHaveLength(2);
 });
 
-test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes from %s, and tells nobody who listens for answers", async (_, medianMs) => {
+test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes from %s, and does not reach listeners for answers", async (_, medianMs) => {
   const bytes = goldenBytes("linear_elastic_band");
   const cases = goldenCases("linear_elastic_band");
-  const { told, listening } = listener();
+  const { reported, listening } = listener();
   const worker = new FakeWorker(medianMs);
   const host = await makeHost(bytes, createHash("sha256").update(bytes).digest("hex"), listening, () => worker);
   const [one, other] = await Promise.all([host.valuesAt(cases[1].poses, "band"), host.valuesAt(cases[2].poses, "band")]);
@@ -99,10 +99,10 @@ test.each([["the page", 0.5], ["a worker", 20]])("the band of other poses comes 
     expect(band?.length).toBe(bandMm?.length);
     bandMm?.forEach((mm, vertex) => expect(Math.abs((band?.[vertex] ?? NaN) - mm)).toBeLessThan(2e-3));
   }
-  expect(told).toEqual([]);
+  expect(reported).toEqual([]);
 });
 
-test("columns without a band know none, and who waits for one is told so when the columns go", async () => {
+test("columns without a band have none, and a pending request ends empty when the host closes", async () => {
   const host = await makeHost(BYTES, SHA256, listener().listening, () => null);
   expect(await host.valuesAt(CASES[1].poses, "band")).toBeNull();
   const worker = new FakeWorker(20);
@@ -113,9 +113,9 @@ test("columns without a band know none, and who waits for one is told so when th
   expect(await waiting).toBeNull();
 });
 
-test("a worker that ends by itself is told of, and leaves nobody waiting", async () => {
+test("a worker that ends by itself is reported, and leaves no request pending", async () => {
   const worker = new FakeWorker(20);
-  const { told, ends, listening } = listener();
+  const { reported, ends, listening } = listener();
   const host = await makeHost(BYTES, SHA256, listening, () => worker);
   host.ask(CASES[1].poses, 1);
   worker.postMessage = () => {};
@@ -125,7 +125,7 @@ test("a worker that ends by itself is told of, and leaves nobody waiting", async
   expect(ends).toEqual(["ended"]);
   expect(worker.isTerminated).toBe(true);
   worker.letOut();
-  expect(told).toEqual([]);
+  expect(reported).toEqual([]);
 });
 
 test("a worker that cannot answer says so, and counts as ended", async () => {
@@ -137,11 +137,11 @@ test("a worker that cannot answer says so, and counts as ended", async () => {
 });
 
 test("a browser without workers evaluates in the page", async () => {
-  const { told, listening } = listener();
+  const { reported, listening } = listener();
   const host = await makeHost(BYTES, SHA256, listening, () => null);
   host.ask(CASES[7].poses, 1);
   expect([host.place, host.hasWorkers]).toEqual(["page", false]);
-  expect(told[0].coverage).toBe("beyond");
+  expect(reported[0].coverage).toBe("beyond");
 });
 
 test("a worker that does not start is done without", async () => {

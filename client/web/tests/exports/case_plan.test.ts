@@ -53,6 +53,6 @@ test("a mesh with more arrays than its stiffness has a digest of its own, and th
 test.each<[string, [number, number]]>([
   ["two tissues of one stiffness", [16000, 16000]],
   ["a stiffness that is no label", [16000, 27000.5]],
-])("ranges are left out where the stiffness tells no tissues apart: %s", async (_, stiffness) => {
+])("ranges are left out where the stiffness does not distinguish tissues: %s", async (_, stiffness) => {
   expect(await plannedRanges(await caseOf(stiffness))).toBeNull();
 });

@@ -4,7 +4,7 @@
 import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";
 import { openCase } from "../../src/case/case_file";
-import { type ToldPlan, planDocument } from "../../src/exports/plan_export";
+import { type ExportedPlan, planDocument } from "../../src/exports/plan_export";
 import { SolveSummarySchema } from "../../src/generated/tissueform/v1/deform_service_pb";
 import type { Prediction } from "../../src/generated/tissueform/v1/prediction_pb";
 import { DeformationModel } from "../../src/generated/tissueform/v1/session_pb";
@@ -18,12 +18,12 @@ import { smallCase, sourceOf } from "../testing/small_case";
 const FORWARD_MM = 4;
 
 /** The jaw forward, the skin a millimetre to the left, and a chin whose midline is measured. */
-async function told(changes: Partial<ToldPlan> = {}) {
+async function exported(changes: Partial<ExportedPlan> = {}) {
   const file = await openCase(sourceOf(smallCase()));
   const [plan, landmarks] = [new Plan(file), new LandmarkBook(file)];
   plan.change(0, { forwardMm: FORWARD_MM }, true);
   landmarks.place("soft_pogonion", { surface: 0, triangle: 0, weights: [1, 0, 0] });
-  const bench: ToldPlan = {
+  const bench: ExportedPlan = {
     file,
     plan,
     landmarks,
@@ -42,7 +42,7 @@ async function told(changes: Partial<ToldPlan> = {}) {
 }
 
 test("the plan's face goes along with its numbers and their band", async () => {
-  const document = await told();
+  const document = await exported();
   expect(document.segments[0].move.forwardMm).toBe(FORWARD_MM);
   expect(document.landmarks).toMatchObject([{ name: "pogonion", forwardMm: FORWARD_MM }, { name: "soft_pogonion", leftMm: 1, band_95_mm: 0.25 }]);
   expect(document.measures).toMatchObject([{ name: "chin_midline", before: 0, after: 1, lowest_after: expect.closeTo(0.75), highest_after: expect.closeTo(1.25), interval_of: "material" }]);
@@ -50,7 +50,7 @@ test("the plan's face goes along with its numbers and their band", async () => {
 });
 
 test("of another face there is no number beside the plan's, and the file says so", async () => {
-  const document = await told({ showsPlan: false });
+  const document = await exported({ showsPlan: false });
   expect(document.segments[0].move.forwardMm).toBe(FORWARD_MM);
   expect(document.measurement_landmarks.placed.length).toBe(1);
   expect(document.left_out).toMatch(/^landmarks, measures and answer: the face that is shown is not the plan's/);
@@ -64,7 +64,7 @@ test.each<[string, ShownAnswer | null, object | null]>([
   ["one that was not reached", { by: "server", isRefining: false, summary: create(SolveSummarySchema, { load: 0.6 }) }, { converged: false, load: 0.6, error_bound_mm: null, error_estimate_mm: null }],
   ["the page's own", { by: "page", errorBoundMm: 0.3, isEstimate: true }, { given_by: "page", error_bound_mm: null, error_estimate_mm: 0.3 }],
 ])("the answer is that of the face: %s", async (_, answer, facts) => {
-  const document = await told({ answer: new Signal(answer) });
+  const document = await exported({ answer: new Signal(answer) });
   if (facts === null) expect(document.answer).toBeNull();
   else expect(document.answer).toMatchObject(facts);
 });

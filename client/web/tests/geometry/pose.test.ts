@@ -38,11 +38,11 @@ describe("pitch, roll and yaw", () => {
     } else expect(back.yawDeg).toBe(0);
   });
 
-  test.each(golden.same_rotation.map((entry) => [entry.name, entry] as const))("%s", (_, { given, told }) => {
+  test.each(golden.same_rotation.map((entry) => [entry.name, entry] as const))("%s", (_, { given, told: expected }) => {
     const angles = anglesOf(rotationOf(given.pitch_deg, given.roll_deg, given.yaw_deg));
-    expect(angles.pitchDeg).toBeCloseTo(told.pitch_deg, 6);
-    expect(Math.cos(((angles.rollDeg - told.roll_deg) * Math.PI) / 180)).toBeCloseTo(1, 9);
-    expect(Math.cos(((angles.yawDeg - told.yaw_deg) * Math.PI) / 180)).toBeCloseTo(1, 9);
+    expect(angles.pitchDeg).toBeCloseTo(expected.pitch_deg, 6);
+    expect(Math.cos(((angles.rollDeg - expected.roll_deg) * Math.PI) / 180)).toBeCloseTo(1, 9);
+    expect(Math.cos(((angles.yawDeg - expected.yaw_deg) * Math.PI) / 180)).toBeCloseTo(1, 9);
   });
 
   test("positive pitch raises the chin, roll lowers the left side, yaw turns to the left", () => {

@@ -110,7 +110,7 @@ describe("bone in bone", () => {
     expect(test2.find(moved(5))).toEqual([]);
   });
 
-  test("is told with its depth and places", () => {
+  test("is reported with its depth and places", () => {
     const [found] = test2.find(moved(-4));
     expect(found).toMatchObject({ segment: "mandible", other: "skull" });
     expect(found.depthMm).toBeGreaterThan(2.2);

@@ -27,7 +27,7 @@ function sheet(up: number, isUp: boolean, handle: string): Teeth {
 const shift = (up: number): ReadonlyMap<string, Pose> => new Map([["mandible", { rotationVector: [0, 0, 0], pivotMm: [1, 2, 3], translationMm: [0, 0, up], scale: 1 }]]);
 const bite = () => new ToothContact([sheet(2, false, "")], [sheet(0, true, "mandible")]);
 
-test("teeth that lie apart tell the gap and no contact", () => {
+test("teeth that lie apart have a gap and no contact", () => {
   const contact = bite().find(shift(0));
   expect(contact).toMatchObject({ areaMm2: 0, deepestMm: 0, leastMm: expect.closeTo(2, 5) });
   expect(contact.upperMm[0].every((mm) => Math.abs(mm - 2) < 1e-5)).toBe(true);

@@ -23,7 +23,7 @@ const POSES = toMessages(["mandible"], [{ rotationVector: [0, 0, 0], pivotMm: [0
 function drag() {
   const sockets: FakeSocket[] = [];
   const timers: { action: () => void; delayMs: number }[] = [];
-  const told: string[] = [];
+  const events: string[] = [];
   const pictures: { picture: DisplayedFrame; used: () => void }[] = [];
   const errors: CallError[] = [];
   let now = 0;
@@ -42,11 +42,11 @@ function drag() {
     gateway,
     create(DeformConfigurationSchema, { session: "sessions/abc" }),
     {
-      onStarted: () => told.push("started"),
+      onStarted: () => events.push("started"),
       onPicture: (picture, used) => pictures.push({ picture, used }),
-      onNotice: ({ notice }) => told.push(notice.case ?? ""),
-      onWaiting: (isWaiting) => told.push(isWaiting ? "waiting" : "answered"),
-      onBroken: () => told.push("broken"),
+      onNotice: ({ notice }) => events.push(notice.case ?? ""),
+      onWaiting: (isWaiting) => events.push(isWaiting ? "waiting" : "answered"),
+      onBroken: () => events.push("broken"),
       onEnd: (error) => errors.push(error),
     },
     (action, delayMs) => {
@@ -56,7 +56,7 @@ function drag() {
     () => now,
   );
   const last = () => sockets[sockets.length - 1];
-  return { session, sockets, timers, told, pictures, errors, last, bearer, sleep: (ms: number) => (now += ms) };
+  return { session, sockets, timers, events, pictures, errors, last, bearer, sleep: (ms: number) => (now += ms) };
 }
 
 function sessionMoved(): Uint8Array {
@@ -70,7 +70,7 @@ const frame = (sequence: bigint, refinement = 0) => ({
 });
 
 describe("a drag", () => {
-  test("goes on with a new token, which it is told once", () => {
+  test("goes on with a new token, which it sends once", () => {
     const { last, bearer } = drag();
     bearer.token = "first";
     expect(last().deformRequests()).toHaveLength(1);
@@ -78,8 +78,8 @@ describe("a drag", () => {
     bearer.token = "second";
     bearer.token = "second";
     bearer.token = "";
-    const told = last().deformRequests().flatMap(({ message }) => (message.case === "token" ? [message.value] : []));
-    expect(told).toEqual(["first", "second"]);
+    const sent = last().deformRequests().flatMap(({ message }) => (message.case === "token" ? [message.value] : []));
+    expect(sent).toEqual(["first", "second"]);
   });
 
   test("that is over hears of no more tokens", () => {
@@ -91,7 +91,7 @@ describe("a drag", () => {
   });
 
   test("begins with its configuration and sends the newest poses once the server listens", () => {
-    const { session, last, told } = drag();
+    const { session, last, events } = drag();
     session.sendPoses(POSES, false);
     session.sendPoses(POSES, false);
     expect(last().deformRequests().map(({ message }) => message.case)).toEqual(["configuration"]);
@@ -100,7 +100,7 @@ describe("a drag", () => {
     const [, pose, ...others] = last().deformRequests();
     expect(others).toHaveLength(0);
     expect(pose.message).toMatchObject({ case: "pose", value: { sequence: 2n, commit: false } });
-    expect(told).toEqual(["started"]);
+    expect(events).toEqual(["started"]);
   });
 
   test("acknowledges a picture when it was used, not before", () => {
@@ -119,11 +119,11 @@ describe("a drag", () => {
   });
 
   test("goes on over another connection with the newest poses", () => {
-    const { session, sockets, timers, last, told } = drag();
+    const { session, sockets, timers, last, events } = drag();
     last().answer(STARTED);
     session.sendPoses(POSES, false);
     last().onclose?.({ code: 1006, reason: "" });
-    expect(told).toEqual(["started", "broken"]);
+    expect(events).toEqual(["started", "broken"]);
     session.sendPoses(POSES, false);
     timers[0].action();
     expect(sockets).toHaveLength(2);
@@ -168,8 +168,8 @@ describe("a drag", () => {
     },
   );
 
-  test("whose session moves goes on at once, with the newest poses and what was not kept", () => {
-    const { session, sockets, timers, last, told } = drag();
+  test("continues at once when its session moves, with the newest poses and the pending commit", () => {
+    const { session, sockets, timers, last, events } = drag();
     last().answer(STARTED);
     session.sendPoses(POSES, true);
     last().end(Code.Unavailable, "elsewhere", sessionMoved());
@@ -179,7 +179,7 @@ describe("a drag", () => {
     expect(sockets).toHaveLength(2);
     last().answer(STARTED);
     expect(last().deformRequests()[1].message).toMatchObject({ case: "pose", value: { sequence: 2n, commit: true } });
-    expect(told).toEqual(["started", "broken", "started"]);
+    expect(events).toEqual(["started", "broken", "started"]);
   });
 
   test("repeats a commit until the server says that it keeps the poses", () => {
@@ -199,14 +199,14 @@ describe("a drag", () => {
     expect(last().deformRequests()[1].message).toMatchObject({ value: { commit: false } });
   });
 
-  test("tells notices in their order", () => {
-    const { last, told } = drag();
+  test("reports notices in their order", () => {
+    const { last, events } = drag();
     const notice = (name: "evicted" | "restored" | "draining") => ({ message: { case: "notice" as const, value: { notice: { case: name, value: {} } } } });
     last().answer(STARTED);
     last().answer(notice("evicted"));
     last().answer(notice("restored"));
     last().answer(notice("draining"));
-    expect(told).toEqual(["started", "evicted", "restored", "draining"]);
+    expect(events).toEqual(["started", "evicted", "restored", "draining"]);
   });
 
   test("ends where trying again does not help", () => {
@@ -216,11 +216,11 @@ describe("a drag", () => {
     expect(timers).toHaveLength(0);
   });
 
-  test("that was closed tells nothing more and tries nothing more", () => {
-    const { session, last, timers, told } = drag();
+  test("that was closed reports nothing more and does not reconnect", () => {
+    const { session, last, timers, events } = drag();
     session.close();
     last().onclose?.({ code: 1006, reason: "" });
-    expect(told).toEqual([]);
+    expect(events).toEqual([]);
     expect(timers).toHaveLength(0);
   });
 
@@ -236,7 +236,7 @@ describe("a drag", () => {
 function timedDrag() {
   const clock = new FakeClock();
   const sockets: FakeSocket[] = [];
-  const told: string[] = [];
+  const events: string[] = [];
   const used: (() => void)[] = [];
   const patience = new Patience();
   const open = (method: any, handlers: any, options: any) => {
@@ -248,12 +248,12 @@ function timedDrag() {
   };
   const gateway = { bearer: new Bearer(), open } as unknown as Pick<Gateway, "open" | "bearer">;
   const listener = {
-    onStarted: () => told.push("started"),
+    onStarted: () => events.push("started"),
     onPicture: (_: DisplayedFrame, wasUsed: () => void) => used.push(wasUsed),
     onNotice: () => {},
-    onWaiting: (isWaiting: boolean) => told.push(isWaiting ? "waiting" : "answered"),
-    onBroken: (error: CallError) => told.push(`broken: ${error.message}`),
-    onEnd: () => told.push("end"),
+    onWaiting: (isWaiting: boolean) => events.push(isWaiting ? "waiting" : "answered"),
+    onBroken: (error: CallError) => events.push(`broken: ${error.message}`),
+    onEnd: () => events.push("end"),
   };
   const session = new DragSession(gateway, create(DeformConfigurationSchema, { session: "sessions/abc", maxUnacked: 3 }), listener, clock.timer, () => clock.nowMs);
   const last = () => sockets[sockets.length - 1];
@@ -266,7 +266,7 @@ function timedDrag() {
   };
   last().heartbeat();
   last().answer(STARTED);
-  return { session, clock, sockets, told, used, last, beat };
+  return { session, clock, sockets, events, used, last, beat };
 }
 
 const committed = (sequence: bigint) => ({ message: { case: "notice" as const, value: { notice: { case: "committed" as const, value: { sequence } } } } });
@@ -274,52 +274,52 @@ const noticed = (name: "evicted" | "restored") => ({ message: { case: "notice" a
 
 describe("over a connection that is open and dead", () => {
   test("a pose without an answer is waited for after 2 s, and sent over another connection after 8 s", () => {
-    const { session, clock, sockets, told, last } = timedDrag();
+    const { session, clock, sockets, events, last } = timedDrag();
     session.sendPoses(POSES, true);
     clock.pass(1.9);
-    expect(told).toEqual(["started"]);
+    expect(events).toEqual(["started"]);
     clock.pass(0.1);
-    expect(told).toEqual(["started", "waiting"]);
+    expect(events).toEqual(["started", "waiting"]);
     clock.pass(5.9);
     expect(sockets).toHaveLength(1);
     clock.pass(0.5);
-    expect(told.slice(2)).toEqual(["broken: the server has not answered for 8 s"]);
+    expect(events.slice(2)).toEqual(["broken: the server has not answered for 8 s"]);
     expect(sockets).toHaveLength(2);
     expect(sockets[0].closedWith).toBe(1000);
     last().answer(STARTED);
     expect(last().deformRequests()[1].message).toMatchObject({ case: "pose", value: { sequence: 1n, commit: true } });
     last().answer(frame(1n));
     last().answer(committed(1n));
-    expect(told.slice(3)).toEqual(["started"]);
+    expect(events.slice(3)).toEqual(["started"]);
     expect(session.isCommitted).toBe(true);
     session.sendPoses(POSES, true);
     clock.pass(8.5);
-    expect(told.slice(4)).toEqual(["waiting", "broken: the server has not answered for 8 s"]);
+    expect(events.slice(4)).toEqual(["waiting", "broken: the server has not answered for 8 s"]);
   });
 
   test.each([false, true])("so is one whose gateway lives (commit: %s)", (commit) => {
-    const { session, sockets, told, beat } = timedDrag();
+    const { session, sockets, events, beat } = timedDrag();
     session.sendPoses(POSES, commit);
     beat(9);
-    expect(told).toEqual(["started", "waiting", "broken: the server has not answered for 8 s"]);
+    expect(events).toEqual(["started", "waiting", "broken: the server has not answered for 8 s"]);
     expect(sockets).toHaveLength(2);
   });
 
   test("so is a commit whose frame has come", () => {
-    const { session, told, last, beat, used } = timedDrag();
+    const { session, events, last, beat, used } = timedDrag();
     session.sendPoses(POSES, true);
     last().answer(frame(1n));
     used[0]();
     beat(3);
-    expect(told).toEqual(["started", "waiting"]);
+    expect(events).toEqual(["started", "waiting"]);
     last().answer(committed(1n));
-    expect(told).toEqual(["started", "waiting", "answered"]);
+    expect(events).toEqual(["started", "waiting", "answered"]);
     beat(60);
-    expect(told).toHaveLength(3);
+    expect(events).toHaveLength(3);
   });
 
   test("nothing is waited for while answers come, nor once all have come", () => {
-    const { session, told, last, beat, used } = timedDrag();
+    const { session, events, last, beat, used } = timedDrag();
     for (let i = 1; i <= 20; ++i) {
       session.sendPoses(POSES, false);
       beat(1);
@@ -327,46 +327,46 @@ describe("over a connection that is open and dead", () => {
       used[i - 1]();
     }
     beat(300);
-    expect(told).toEqual(["started"]);
+    expect(events).toEqual(["started"]);
   });
 
-  test("the hand rests: the gateway's silence is told after 5 s, and ends the connection after 8 s", () => {
-    const { clock, sockets, told } = timedDrag();
+  test("the hand rests: the gateway's silence is reported after 5 s, and ends the connection after 8 s", () => {
+    const { clock, sockets, events } = timedDrag();
     clock.pass(4.5);
-    expect(told).toEqual(["started"]);
+    expect(events).toEqual(["started"]);
     clock.pass(1);
-    expect(told).toEqual(["started", "waiting"]);
+    expect(events).toEqual(["started", "waiting"]);
     clock.pass(3);
     expect(sockets).toHaveLength(2);
   });
 
   test("a page that shows no pictures is not owed any", () => {
-    const { session, told, last, beat, used } = timedDrag();
+    const { session, events, last, beat, used } = timedDrag();
     for (let i = 1; i <= 3; ++i) {
       session.sendPoses(POSES, false);
       last().answer(frame(BigInt(i)));
     }
     session.sendPoses(POSES, false);
     beat(60);
-    expect(told).toEqual(["started"]);
+    expect(events).toEqual(["started"]);
     used[2]();
     beat(2);
-    expect(told).toEqual(["started", "waiting"]);
+    expect(events).toEqual(["started", "waiting"]);
   });
 
   test("a session that comes back to memory is waited for as long as the gateway lives", () => {
-    const { session, told, last, beat } = timedDrag();
+    const { session, events, last, beat } = timedDrag();
     session.sendPoses(POSES, true);
     last().answer(noticed("evicted"));
     beat(120);
-    expect(told).toEqual(["started"]);
+    expect(events).toEqual(["started"]);
     last().answer(noticed("restored"));
     beat(2);
-    expect(told).toEqual(["started", "waiting"]);
+    expect(events).toEqual(["started", "waiting"]);
   });
 
   test("an answer that takes longer is given twice the time again, and comes", () => {
-    const { session, clock, sockets, told, last } = timedDrag();
+    const { session, clock, sockets, events, last } = timedDrag();
     session.sendPoses(POSES, false);
     const seconds: number[] = [];
     for (let from = clock.nowMs; sockets.length < 4; from = clock.nowMs) {
@@ -381,6 +381,6 @@ describe("over a connection that is open and dead", () => {
     session.sendPoses(POSES, false);
     clock.pass(40);
     expect(sockets).toHaveLength(4);
-    expect(told.filter((word) => word === "end")).toEqual([]);
+    expect(events.filter((word) => word === "end")).toEqual([]);
   });
 });

@@ -50,7 +50,7 @@ test("links that were ended are not given again", async () => {
   expect((await made.make()).url).toContain("tfl_2");
 });
 
-test("what the server refuses is told as its error", async () => {
+test("a refusal by the server is reported as its error", async () => {
   const { made, createFollowLink } = links(true);
   createFollowLink.mockRejectedValue(new ConnectError("too many links", Code.ResourceExhausted));
   await expect(made.make()).rejects.toEqual(new CallError(Code.ResourceExhausted, "too many links"));

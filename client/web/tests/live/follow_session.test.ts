@@ -19,7 +19,7 @@ const settle = () => new Promise((done) => setImmediate(done));
 /** On a clock, or on timers that the test lets run out. */
 function follow(clock?: FakeClock) {
   const sockets: FakeSocket[] = [];
-  const told: string[] = [];
+  const events: string[] = [];
   const pictures: { picture: FollowedPicture; used: () => void }[] = [];
   const timers: (() => void)[] = [];
   const stopped: (() => void)[] = [];
@@ -40,12 +40,12 @@ function follow(clock?: FakeClock) {
     gateway as never,
     "sessions/abc",
     {
-      onStarted: () => told.push("started"),
+      onStarted: () => events.push("started"),
       onPicture: (picture, used) => pictures.push({ picture, used }),
-      onNotice: () => told.push("notice"),
-      onWaiting: (isWaiting) => told.push(isWaiting ? "waiting" : "goes on"),
-      onBroken: () => told.push("broken"),
-      onEnd: (error) => told.push(error.message),
+      onNotice: () => events.push("notice"),
+      onWaiting: (isWaiting) => events.push(isWaiting ? "waiting" : "goes on"),
+      onBroken: () => events.push("broken"),
+      onEnd: (error) => events.push(error.message),
     },
     clock?.timer ?? ((action) => (timers.push(action), () => stopped.push(action))),
   );
@@ -53,7 +53,7 @@ function follow(clock?: FakeClock) {
     const payload = toBinary(WatchResponseSchema, create(WatchResponseSchema, { message }));
     sockets[sockets.length - 1].onmessage?.({ data: encodeFrame(FrameKind.Message, payload).buffer });
   };
-  return { sockets, told, pictures, timers, stopped, acknowledgeWatch, bearer, answer };
+  return { sockets, events, pictures, timers, stopped, acknowledgeWatch, bearer, answer };
 }
 
 const started = (vertices: number[], encoding = PositionEncoding.FLOAT32) => ({
@@ -101,21 +101,21 @@ test("one that a newer one stands for is not repeated", async () => {
   expect(acknowledgeWatch).toHaveBeenCalledTimes(2);
 });
 
-test("a gateway that gives no sign of life is told, and its watch opened again", () => {
+test("a silent gateway is reported, and its watch is opened again", () => {
   const clock = new FakeClock();
-  const { told, answer, sockets } = follow(clock);
+  const { events, answer, sockets } = follow(clock);
   sockets[0].heartbeat();
   answer(started([4]));
   clock.pass(5.5);
-  expect(told).toEqual(["started", "waiting"]);
+  expect(events).toEqual(["started", "waiting"]);
   sockets[0].heartbeat();
-  expect(told).toEqual(["started", "waiting", "goes on"]);
+  expect(events).toEqual(["started", "waiting", "goes on"]);
   clock.pass(9);
-  expect(told.slice(3)).toEqual(["waiting", "broken"]);
+  expect(events.slice(3)).toEqual(["waiting", "broken"]);
   expect(sockets).toHaveLength(2);
 });
 
-test("a new token is told by acknowledging once more", () => {
+test("a new token is sent with a repeated acknowledgment", () => {
   const { answer, pictures, acknowledgeWatch, bearer } = follow();
   answer(started([4]));
   bearer.token = "before any picture";
@@ -136,20 +136,20 @@ test("another form holds for the frames after it", () => {
 });
 
 test("packed frames are refused in words", () => {
-  const { answer, told } = follow();
+  const { answer, events } = follow();
   answer(started([4], PositionEncoding.INT16_ZSTD));
   answer(frame(1n, [1, 2, 3]));
-  expect(told[told.length - 1]).toContain("cannot unpack");
+  expect(events[events.length - 1]).toContain("cannot unpack");
 });
 
 test("a watch that breaks off begins again, one whose session is gone ends", () => {
-  const { sockets, told, timers, answer } = follow();
+  const { sockets, events, timers, answer } = follow();
   answer(started([4]));
   sockets[0].onclose?.({ code: 1006, reason: "" });
   timers[0]();
   expect(sockets).toHaveLength(2);
   sockets[1].end(5, "no such session");
-  expect(told).toEqual(["started", "broken", "no such session"]);
+  expect(events).toEqual(["started", "broken", "no such session"]);
   expect(timers).toHaveLength(1);
 });
 

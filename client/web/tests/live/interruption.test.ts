@@ -9,7 +9,7 @@ import { Interruption } from "../../src/live/interruption";
 const GONE = new CallError(Code.Unavailable, "the server is gone");
 const MOVED = new CallError(Code.Unavailable, "the session is elsewhere", "SESSION_MOVED");
 
-test("one server that is away is told by its error", () => {
+test("a single server that is away is reported by its error", () => {
   expect(new Interruption({ isCluster: false }).connection(GONE)).toEqual({ kind: "broken", text: "The server is gone." });
 });
 
@@ -18,12 +18,12 @@ test("in a cluster the session moves, as a short word", () => {
   expect(new Interruption({ isCluster: false }).connection(MOVED)).toEqual({ kind: "moving" });
 });
 
-test("what no server can mend is told at once", () => {
+test("an error that another server cannot fix is reported at once", () => {
   const blocked = new CallError(Code.Unavailable, "a proxy blocks WebSockets", BLOCKED);
   expect(new Interruption({ isCluster: true }).connection(blocked)).toEqual({ kind: "broken", text: "A proxy blocks WebSockets." });
 });
 
-test("what lasts longer than any move is told by its error, until it goes on", () => {
+test("an interruption longer than any move is reported by its error, until it ends", () => {
   let now = 0;
   const interruption = new Interruption({ isCluster: true }, () => now);
   interruption.connection(GONE);

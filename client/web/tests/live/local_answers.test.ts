@@ -109,23 +109,23 @@ function local(bytes: () => Uint8Array = () => goldenBytes("linear_elastic")) {
 test("a pose is answered before the question returns, once the columns are there", async () => {
   const { answers, firsts, last } = local();
   answers.ask(CASES[1].poses);
-  expect(answers.posesSinceTold).toBe(Infinity);
+  expect(answers.posesSinceShown).toBe(Infinity);
   await answers.follow(configuration());
   expect(firsts).toHaveLength(1);
   answers.ask(CASES[2].poses);
   expect(firsts).toHaveLength(2);
   expect(firsts[1]).toBeCloseTo(CASES[2].positionsMm[0], 4);
-  expect(answers.posesSinceTold).toBe(0);
+  expect(answers.posesSinceShown).toBe(0);
   expect(last()).toMatchObject({ kind: "ready", coverage: "covered", place: "page", hasWorkers: false });
 });
 
-test("beyond the range nothing is told, and how old the last answer is", async () => {
+test("beyond the range no answer is reported, and the age of the last one is known", async () => {
   const { answers, firsts, last } = local();
   await answers.follow(configuration());
   answers.ask(CASES[1].poses);
   answers.ask(CASES[7].poses);
   expect(firsts).toHaveLength(1);
-  expect(answers.posesSinceTold).toBe(1);
+  expect(answers.posesSinceShown).toBe(1);
   expect(last()).toMatchObject({ kind: "ready", coverage: "beyond" });
 });
 
@@ -174,10 +174,10 @@ test("a model without prepared answers, and another session, leave the server to
   answers.ask(CASES[1].poses);
   expect(firsts).toEqual([]);
   expect(last()).toEqual({ kind: "none" });
-  expect(answers.posesSinceTold).toBe(Infinity);
+  expect(answers.posesSinceShown).toBe(Infinity);
 });
 
-test("who stops it is answered by the server until it is resumed", async () => {
+test("after a stop the server answers until local answers are resumed", async () => {
   const { answers, firsts, last } = local();
   await answers.follow(configuration());
   answers.stop();
@@ -207,7 +207,7 @@ test("a worker that ends by itself leaves the server to answer until it is asked
   expect(offsets).toEqual([0, 0]);
 });
 
-test("damaged columns are told in a sentence, and the server answers", async () => {
+test("damaged columns are reported in a sentence, and the server answers", async () => {
   const { answers, firsts, last } = local(() => goldenBytes("linear_elastic").slice(0, 20_000));
   await answers.follow(configuration());
   answers.ask(CASES[1].poses);

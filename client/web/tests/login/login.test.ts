@@ -108,7 +108,7 @@ function visits() {
   return { tab, provider, timers, load, back, signedIn, pass };
 }
 
-test("who is known to the provider is in without being asked, where they were", async () => {
+test("a user whom the provider knows is signed in without a prompt, at the same address", async () => {
   const { tab, provider, load, back } = visits();
   const first = await load();
   expect(first.login.state.kind).toBe("asking");
@@ -127,7 +127,7 @@ test("no token lies in the tab's storage", async () => {
   expect(Array.from(tab.kept)).toEqual([]);
 });
 
-test("who is not known is shown the way in, and then is asked", async () => {
+test("an unknown user sees the sign-in button, and then the provider's prompt", async () => {
   const { tab, provider, load, back } = visits();
   await load();
   const { login } = await back({ error: "login_required" });
@@ -218,7 +218,7 @@ test("a provider that stays away ends the login with the token", async () => {
   expect(bearer.token).toBe("");
 });
 
-test("without a refresh token the user is told before the end, and at it", async () => {
+test("without a refresh token the user is notified before the end, and at it", async () => {
   const { signedIn, pass } = visits();
   const { login, bearer } = await signedIn(tokens("one", null));
   await pass();
@@ -248,7 +248,7 @@ test("work is kept over a login that fails", async () => {
   expect((await back()).login.work).toEqual({ poses: [1] });
 });
 
-test.each([[true, `${ISSUER}/end`], [false, "https://planner.example.org/"]])("who signs out is not signed in again unasked (%s)", async (canEnd, url) => {
+test.each([[true, `${ISSUER}/end`], [false, "https://planner.example.org/"]])("a user who signs out is not signed in again without a prompt (%s)", async (canEnd, url) => {
   const { tab, provider, timers, signedIn, load } = visits();
   provider.canEndSessions = canEnd;
   const { login, bearer } = await signedIn();

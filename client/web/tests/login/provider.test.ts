@@ -46,7 +46,7 @@ test("a provider of another name is named, and so is the one that is expected", 
   expect(sentence).toContain("--oidc-issuer");
 });
 
-test("a provider for all tenants is told from another provider", async () => {
+test("a provider for all tenants is distinguished from another provider", async () => {
   const sentence = await said(undefined, { issuer: "https://login.example.org/{tenantid}/v2.0" });
   expect(sentence).toContain("{tenantid}");
   expect(sentence).toContain("to your own tenant");
@@ -60,13 +60,13 @@ test("an ID token of another issuer names both", async () => {
 test.each([
   ["exp", -300, /ended 30\d s ago/],
   ["nbf", 300, /becomes valid in (300|299) s/],
-])("a clock that is off by 5 minutes is a sentence about clocks (%s)", async (claim, offset, told) => {
+])("a clock that is off by 5 minutes is a sentence about clocks (%s)", async (claim, offset, pattern) => {
   const sentence = await said(undefined, { claims: { [claim]: seconds() + offset } });
-  expect(sentence).toMatch(told);
+  expect(sentence).toMatch(pattern);
   expect(sentence).toContain("clock of this computer");
 });
 
-test("what a provider sends is bounded and printable before it is shown", async () => {
+test("text from a provider is bounded and printable before it is shown", async () => {
   const sentence = await said(undefined, { claims: { iss: `https://evil.example/\u202e\n${"a".repeat(5000)}` } });
   expect(sentence).toContain("https://evil.example/??aaa");
   expect(sentence.length).toBeLessThan(500);

@@ -11,7 +11,7 @@ import { NewestPoses } from "../../src/movingfile/newest_poses";
 const posesAt = (mm: number): Pose[] => [{ rotationVector: [0, 0, 0], pivotMm: [0, 0, 0], translationMm: [mm, 0, 0], scale: 1 }];
 const ANSWER: Answer = { positions: new Float32Array(3), errorBoundMm: 0, isEstimate: false, uncertainty: null };
 
-/** Answers the load; what is asked then waits until `tell` or `fail`. */
+/** Answers the load; what is asked then waits until `reply` or `fail`. */
 class FakeWorker implements WorkerLike {
   onmessage: Worker["onmessage"] = null;
   onerror: Worker["onerror"] = null;
@@ -19,7 +19,7 @@ class FakeWorker implements WorkerLike {
   readonly asked: number[] = [];
 
   postMessage(request: Request): void {
-    if ("bytes" in request) queueMicrotask(() => this.tell({ isOpen: true }));
+    if ("bytes" in request) queueMicrotask(() => this.reply({ isOpen: true }));
     else this.asked.push(request.poses[0].translationMm[0]);
   }
 
@@ -27,7 +27,7 @@ class FakeWorker implements WorkerLike {
     this.isTerminated = true;
   }
 
-  tell(data: Reply): void {
+  reply(data: Reply): void {
     this.onmessage?.call(this as never, { data } as MessageEvent);
   }
 
@@ -37,12 +37,12 @@ class FakeWorker implements WorkerLike {
 }
 
 function follow(engine: Engine) {
-  const told: (number | string)[] = [];
+  const reported: (number | string)[] = [];
   const newest = new NewestPoses(engine, {
-    onAnswer: (poses, answer) => told.push(answer === null ? "beyond" : poses[0].translationMm[0]),
-    onFailed: (thrown) => told.push(String(thrown)),
+    onAnswer: (poses, answer) => reported.push(answer === null ? "beyond" : poses[0].translationMm[0]),
+    onFailed: (thrown) => reported.push(String(thrown)),
   });
-  return { told, newest };
+  return { reported, newest };
 }
 
 async function started() {
@@ -53,33 +53,33 @@ async function started() {
 }
 
 test("one question at a time, and of those that wait the newest", async () => {
-  const { worker, told, newest } = await started();
+  const { worker, reported, newest } = await started();
   [1, 2, 3].forEach((mm) => void newest.ask(posesAt(mm)));
   expect([worker.asked, newest.isIdle]).toEqual([[1], false]);
-  worker.tell({ answer: ANSWER });
+  worker.reply({ answer: ANSWER });
   await expect.poll(() => worker.asked).toEqual([1, 3]);
-  worker.tell({ answer: null });
+  worker.reply({ answer: null });
   await expect.poll(() => newest.isIdle).toBe(true);
-  expect(told).toEqual([1, "beyond"]);
+  expect(reported).toEqual([1, "beyond"]);
 });
 
-test("an answer that fails is told, and the next question is asked", async () => {
-  const { worker, told, newest } = await started();
+test("an answer that fails is reported, and the next question is asked", async () => {
+  const { worker, reported, newest } = await started();
   const asking = newest.ask(posesAt(1));
-  worker.tell({ problem: "no memory" });
+  worker.reply({ problem: "no memory" });
   await asking;
-  expect([told, newest.isIdle]).toEqual([["Error: no memory"], true]);
+  expect([reported, newest.isIdle]).toEqual([["Error: no memory"], true]);
   void newest.ask(posesAt(2));
-  worker.tell({ answer: ANSWER });
-  await expect.poll(() => told).toEqual(["Error: no memory", 2]);
+  worker.reply({ answer: ANSWER });
+  await expect.poll(() => reported).toEqual(["Error: no memory", 2]);
 });
 
 test("a worker that ends leaves no question open, neither one that it had nor one after it", async () => {
-  const { worker, told, newest } = await started();
+  const { worker, reported, newest } = await started();
   const asking = newest.ask(posesAt(1));
   worker.fail();
   await asking;
   await newest.ask(posesAt(2));
-  expect(told).toEqual(["Error: the worker has ended", "Error: the worker has ended"]);
+  expect(reported).toEqual(["Error: the worker has ended", "Error: the worker has ended"]);
   expect([newest.isIdle, worker.isTerminated, worker.asked]).toEqual([true, true, [1]]);
 });

@@ -12,11 +12,11 @@ test.each<[string, Partial<Ready>, string]>([
   ["nothing lacks", {}, "This page answers at once; the server confirms."],
   ["no workers", { hasWorkers: false }, "This page answers at once (without a background thread: slower); the server confirms."],
   ["beyond the columns", { coverage: "beyond" }, "Outside the prepared range: the server answers."],
-])("who answers the hand: %s", (_, change, text) => {
+])("the text names what answers the hand: %s", (_, change, text) => {
   expect(describeLocal({ ...READY, ...change })).toBe(text);
 });
 
-test("the largest movement is told with its band where that is known", () => {
+test("the largest movement is shown with its band where that is known", () => {
   expect(largestText({ largestMm: 8.123, band: { lowestMm: 7.5, highestMm: 8.8 } })).toBe("largest 8.12 mm, 95 % interval (stiffness only) 7.50 to 8.80");
   expect(largestText({ largestMm: 8.123, band: null })).toBe("largest 8.12 mm");
 });

@@ -28,8 +28,8 @@ test("the hinge itself stays, distances on the jaw stay, and closing brings the 
 
 test("the hinge goes through the landmarks of the condyles where the case has them, else through the ends of the jaw", async () => {
   const landmark = (name: string, x: number) => ({ name, label: name, position_mm: [x, 90, 40] });
-  const told = smallCase({ json: ({ extensions }) => extensions.TISSUEFORM_case.landmarks.push(landmark("condyle_left", 45), landmark("condyle_right", -45)) });
-  expect(hingeAxis(await openCase(sourceOf(told)))).toEqual({ left: [45, 90, 40], right: [-45, 90, 40], source: "landmarks" });
+  const bytes = smallCase({ json: ({ extensions }) => extensions.TISSUEFORM_case.landmarks.push(landmark("condyle_left", 45), landmark("condyle_right", -45)) });
+  expect(hingeAxis(await openCase(sourceOf(bytes)))).toEqual({ left: [45, 90, 40], right: [-45, 90, 40], source: "landmarks" });
   const wide = await openCase(sourceOf(smallCase()));
   const segment = wide.surfaces[1];
   const positions = Float32Array.from([20, 0, 0, -20, 0, 0, 20, 30, 30, -20, 28, 31]);
@@ -38,7 +38,7 @@ test("the hinge goes through the landmarks of the condyles where the case has th
   expect(hingeAxis(wide)).toBeNull();
 });
 
-test("what carries the chin goes along, and incisors tell how far the mouth is open", async () => {
+test("handles that carry the chin go along, and incisors show how far the mouth is open", async () => {
   const landmark = (name: string, y: number, handle: string) => ({ name, label: name, position_mm: [0, y, 0], ...(handle === "" ? {} : { handle }) });
   const bytes = smallCase({ json: ({ extensions }) => extensions.TISSUEFORM_case.landmarks.push(landmark("upper_incisor", -82, ""), landmark("lower_incisor", -80, "mandible")) });
   const file = await openCase(sourceOf(bytes));

@@ -50,7 +50,7 @@ test("a change that changes nothing is nothing to undo", async () => {
   expect(plan.canUndo).toBe(false);
 });
 
-test("limits hold both ways and are told", async () => {
+test("limits hold both ways and are reported", async () => {
   const { plan } = await makePlan();
   expect(plan.change(0, { forwardMm: 15 }, true)).toBe(true);
   expect(plan.change(0, { forwardMm: 16, yawDeg: -25 }, true)).toBe(false);
@@ -67,7 +67,7 @@ test("another pivot leaves the segment where it is", async () => {
   expect(plan.pivot(0)).toEqual([5, 5, 0]);
 });
 
-test("a pivot is told by its name and place, one that nobody knows by its place", async () => {
+test("a known pivot is described by name and place, an unknown one by its place", async () => {
   const { file, plan } = await makePlan();
   const choices = pivotChoices(plan.handles[0], file.manifest.landmarks, [1, 2.25, -3]);
   expect(choices.map(({ label }) => label)).toEqual(["The case’s pivot", "Middle of the segment", "Pogonion"]);

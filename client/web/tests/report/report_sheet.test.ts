@@ -27,14 +27,14 @@ function line(answer: ShownAnswer | null, comparison: Comparison | null = null):
 
 const OWN: ShownAnswer = { by: "page", errorBoundMm: 0.3, isEstimate: true };
 
-test("an estimate is told as one, and that the page gave it itself", () => {
+test("an estimate is labeled as one, and as computed by the page", () => {
   const summary = create(SolveSummarySchema, { prepared: true, errorEstimateMm: 0.4 });
   expect(line({ by: "server", summary, isRefining: true })).toBe("model neo_hookean. Estimate, within about 0.40 mm; the full answer follows.");
   expect(line(OWN)).toBe("model neo_hookean. Estimate, within about 0.30 mm; the full answer follows. Computed by the page; not yet confirmed by the server.");
   expect(line(null)).toBe("model neo_hookean. No answer yet.");
 });
 
-test("a stored face is told by its own model and answer, whatever the plan's is", () => {
+test("a stored face is described by its own model and answer, independently of the plan's", () => {
   const to = create(PredictionSchema, { model: DeformationModel.LINEAR_ELASTIC, summary: { converged: true, load: 1 } });
   expect(line(OWN, { from: "plan", to, share: 1 })).toBe("model linear_elastic. A stored prediction. Full answer.");
   expect(line(OWN, { from: "plan", to, share: 0 })).toMatch(/^model neo_hookean\. Estimate.* Computed by the page/);

@@ -4,13 +4,13 @@
 import "../../src/styles/base.css";
 import { SliceViews } from "../../src/slices/slice_views";
 
-// A page with slices alone: tests/e2e/slice_views.test.ts gives them what they show, and reads what they tell.
+// A page with slices alone: tests/e2e/slice_views.test.ts gives them what they show, and reads what they report.
 
-const told: unknown[][] = [];
+const reported: unknown[][] = [];
 const views = new SliceViews({
-  onCrosshair: (...values) => told.push(["crosshair", ...values]),
-  onPoint: (...values) => told.push(["point", ...values]),
-  onPlane: (...values) => told.push(["plane", ...values]),
+  onCrosshair: (...values) => reported.push(["crosshair", ...values]),
+  onPoint: (...values) => reported.push(["point", ...values]),
+  onPlane: (...values) => reported.push(["plane", ...values]),
 });
 const main = document.createElement("main");
 main.style.cssText = "height: 100vh; display: grid";
@@ -19,4 +19,4 @@ heading.textContent = "Slices";
 heading.className = "hidden";
 main.append(heading, views.element);
 document.body.append(main);
-Object.assign(globalThis, { views, told });
+Object.assign(globalThis, { views, reported });

@@ -90,7 +90,7 @@ describe("a folder of slices", () => {
   });
 });
 
-describe("what is not one even volume is refused", () => {
+describe("a series that is not one even volume is refused", () => {
   test.each<[string, NamedFile[], string]>([
     ["few slices", dicomFolder(7), "the series has 7 slices; a volume needs at least 8"],
     ["a missing slice", dicomFolder(12).filter((_, k) => k !== 5), "1 slice is missing between"],

@@ -53,7 +53,7 @@ const IDENTIFIERS: Readonly<Record<string, readonly [string, string]>> = {
   "00181000": ["LO", `${SECRET}-serial`], "00200010": ["SH", `${SECRET}-s`],
 };
 
-/** Values that tell every voxel of a series apart. */
+/** Values that distinguish every voxel of a series. */
 export function patternOf(rows: number, columns: number, k: number): Int16Array {
   return Int16Array.from({ length: rows * columns }, (_, i) => ((i * 7 + k * 131) % 4000) - 1000);
 }

@@ -35,7 +35,7 @@ test("an answer without a band leaves none of an older one", () => {
   expect(answer.uncertainty).toBeNull();
 });
 
-test("what the evaluator does with its arrays later does not matter", () => {
+test("later changes to the evaluator's arrays do not matter", () => {
   const answer = new NewestAnswer(REST);
   const theirs = band(1, 2);
   answer.takeOwn(own(1, theirs));
@@ -60,7 +60,7 @@ test("the server does not take the face back behind what the page has answered, 
   expect([answer.displacements[0], answer.uncertainty?.[0]]).toEqual([2.5, 1.5]);
 });
 
-test("whose answer the face is, is told with it: an older one of the server is not it, one that confirms is", () => {
+test("the face names its source: an older answer of the server does not replace it, one that confirms does", () => {
   const answer = new NewestAnswer(REST);
   expect(answer.answer).toBeNull();
   answer.takePicture(picture(1, null), Infinity);

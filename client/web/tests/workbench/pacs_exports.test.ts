@@ -37,29 +37,29 @@ function pacs() {
   };
   const subject = new PacsExports({ exports, open } as never, CASE, (action) => (timers.push(action), () => {}));
   subject.start();
-  const tell = (message: MessageInitShape<typeof WatchExportsResponseSchema>) => {
+  const receive = (message: MessageInitShape<typeof WatchExportsResponseSchema>) => {
     const payload = toBinary(WatchExportsResponseSchema, create(WatchExportsResponseSchema, message));
     sockets[sockets.length - 1].onmessage?.({ data: encodeFrame(FrameKind.Message, payload).buffer });
   };
   const states = () => Array.from(subject.byPrediction.value ?? [], ([prediction, { state }]) => [prediction, state]);
-  return { subject, sockets, timers, listed, exports, tell, states };
+  return { subject, sockets, timers, listed, exports, receive, states };
 }
 
 test("the newest of each prediction of the case counts, in whatever order they come", () => {
-  const { tell, states } = pacs();
-  tell({ export: entry({ name: "exports/2", state: ExportState.STORING, etag: "4" }) });
-  tell({ export: entry({ name: "exports/2", state: ExportState.WAITING, etag: "3" }) });
-  tell({ export: entry({ name: "exports/1", state: ExportState.FAILED, etag: "9" }) });
-  tell({ export: entry({ name: "exports/3", case: "cases/b", prediction: "predictions/q" }) });
+  const { receive, states } = pacs();
+  receive({ export: entry({ name: "exports/2", state: ExportState.STORING, etag: "4" }) });
+  receive({ export: entry({ name: "exports/2", state: ExportState.WAITING, etag: "3" }) });
+  receive({ export: entry({ name: "exports/1", state: ExportState.FAILED, etag: "9" }) });
+  receive({ export: entry({ name: "exports/3", case: "cases/b", prediction: "predictions/q" }) });
   expect(states()).toEqual([["predictions/p", ExportState.STORING]]);
 });
 
-test("what is done is listed once the watch has begun, and what is gone goes", async () => {
-  const { subject, tell, listed, states } = pacs();
+test("finished exports are listed once the watch has begun, and removed ones disappear", async () => {
+  const { subject, receive, listed, states } = pacs();
   expect(subject.byPrediction.value).toBeNull();
-  tell({ export: entry({ prediction: "predictions/gone" }) });
+  receive({ export: entry({ prediction: "predictions/gone" }) });
   listed.push(entry({ name: "exports/5", state: ExportState.STORED }));
-  tell({});
+  receive({});
   await vi.waitFor(() => expect(states()).toEqual([["predictions/p", ExportState.STORED]]));
 });
 
@@ -69,7 +69,7 @@ test("a server without exports is asked once, one that breaks off again", () => 
   expect(old.subject.byPrediction.value).toBeNull();
   expect(old.timers).toHaveLength(0);
   const broken = pacs();
-  broken.tell({ export: entry({}) });
+  broken.receive({ export: entry({}) });
   broken.sockets[0].end(UNAVAILABLE, "draining");
   expect(broken.timers).toHaveLength(1);
   broken.timers[0]();
@@ -77,7 +77,7 @@ test("a server without exports is asked once, one that breaks off again", () => 
   expect(broken.states()).toHaveLength(1);
 });
 
-test("what is sent is shown at once, and what is taken back is not", async () => {
+test("a sent export is shown at once, and a withdrawn one is not", async () => {
   const { subject, exports, states } = pacs();
   await subject.send(create(PredictionSchema, { name: "predictions/p" }), []);
   expect(exports.createExport.mock.calls[0]).toMatchObject([{ prediction: "predictions/p", measures: [] }]);
@@ -87,7 +87,7 @@ test("what is sent is shown at once, and what is taken back is not", async () =>
   expect(states()).toEqual([]);
 });
 
-test("a refusal is told", async () => {
+test("a refusal is reported", async () => {
   const { subject, exports } = pacs();
   exports.createExport.mockRejectedValueOnce(new Error("no"));
   await expect(subject.send(create(PredictionSchema, { name: "predictions/p" }), [])).rejects.toThrow("no");

@@ -28,7 +28,7 @@ test.each<[string, ShownAnswer | null, string]>([
   expect(describeAnswer(answer)).toBe(text);
 });
 
-test("a comparison is told by the face that it shows", () => {
+test("a comparison is described by the face that it shows", () => {
   const to = create(PredictionSchema, { name: "predictions/to", summary: { converged: false, load: 0.5 } });
   const other = create(PredictionSchema, { name: "predictions/other" });
   const text = (from: "plan" | "rest" | typeof other, share: number) => describeFace(PREPARED, { from, to, share });

@@ -9,7 +9,7 @@ import { targetSentences } from "../../src/workbench/target_sentences";
 const TARGETS = [{ label: "Chin" }, { label: "Lower lip" }, { label: "Upper lip" }];
 const HANDLES = [{ name: "mandible", label: "Lower jaw" }];
 
-test("targets that contradict each other are told by their names, as is what each of them misses", () => {
+test("targets that contradict each other are reported by name, each with what it misses", () => {
   const response = create(FitResponseSchema, {
     converged: true,
     targets: [
@@ -27,7 +27,7 @@ test("targets that contradict each other are told by their names, as is what eac
   ]);
 });
 
-test("what is held by its limit, and a search that did not end, are told last", () => {
+test("a number at its limit, and a search that did not converge, are reported last", () => {
   const response = create(FitResponseSchema, {
     converged: false,
     numbers: [

@@ -87,7 +87,7 @@ TEST_F(DeviceLoginTest, DoesNotWaitForever) {
   EXPECT_EQ(waits_.size(), 30U);  // a minute, every two seconds
 }
 
-TEST_F(DeviceLoginTest, TellsWhatTheUserHasRefused) {
+TEST_F(DeviceLoginTest, RefusalByUserIsReported) {
   answers_.push_back(Error("access_denied"));
   const absl::Status status = Run().status();
   EXPECT_EQ(status.code(), absl::StatusCode::kPermissionDenied);

@@ -36,7 +36,7 @@ TEST_F(TokenCommandTest, OnlyItsOwnerReadsAPrivateKeyAndNothingIsWrittenOver) {
   EXPECT_EQ(Read("keys/private.pem"), before);
 }
 
-TEST_F(TokenCommandTest, ATokenSaysWhatItWasToldAndHasANameOfItsOwn) {
+TEST_F(TokenCommandTest, TokenHoldsRequestedClaimsAndIsUnique) {
   ASSERT_THAT(Run({"token", "keygen", "--out", Path("keys")}), Succeeds());
   const auto make = [&] {
     return Run({"token", "make", "--key", Path("keys/private.pem"), "--issuer", "i", "--audience",
@@ -102,7 +102,7 @@ TEST_F(TokenCommandTest, APublicKeyMakesNoToken) {
   }
 }
 
-TEST(ShowTokenTest, WhatIsNoTokenIsOneSentence) {
+TEST(ShowTokenTest, MalformedTokenIsReported) {
   for (const char* text : {"", "a", "a.b.c", "..", "e30.e30", "eyJhIjox.e30.", "\xff.\xff.\xff"}) {
     EXPECT_THAT(ShowToken(text, std::chrono::system_clock::now()),
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("not a JSON Web Token")))

@@ -26,7 +26,7 @@ TEST_F(MeshCheckTest, GoodMeshIsUsable) {
               AllOf(HasSubstr("2238"), HasSubstr("10980"), HasSubstr("verdict: usable")));
 }
 
-TEST_F(MeshCheckTest, WarningsAreToldAndDoNotFail) {
+TEST_F(MeshCheckTest, WarningsAreReportedAndDoNotFail) {
   const ProcessResult result =
       Run({"mesh", "check", TestDataPath("meshes/tet_sofa_raptor/raptorTetra_8418.vtu")});
   EXPECT_THAT(result, Succeeds());

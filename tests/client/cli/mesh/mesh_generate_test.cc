@@ -177,7 +177,7 @@ TEST_F(MeshGenerateTest, TimeLimitIsOneLine) {
   EXPECT_THAT(Files(), ElementsAre("cube.off"));
 }
 
-TEST_F(MeshGenerateTest, WrongUseIsToldBeforeAnythingIsRead) {
+TEST_F(MeshGenerateTest, WrongUsageIsReportedBeforeAnyFileIsRead) {
   const std::vector<std::string> command = {"mesh", "generate", "none.off", "--out", "a.vtu"};
   const auto with = [&](const std::string& option, const std::string& value) {
     std::vector<std::string> all = command;

@@ -238,10 +238,10 @@ int ExitCodeAfterSignal(const std::vector<std::string>& arguments, const std::st
     _exit(127);
   }
   close(ends[1]);
-  std::string told;
+  std::string printed;
   char next = 0;
-  while (told.find(word) == std::string::npos && read(ends[0], &next, 1) == 1) told += next;
-  EXPECT_THAT(told, HasSubstr(word));
+  while (printed.find(word) == std::string::npos && read(ends[0], &next, 1) == 1) printed += next;
+  EXPECT_THAT(printed, HasSubstr(word));
   kill(child, signal_number);
   int status = 0;
   waitpid(child, &status, 0);

@@ -163,7 +163,7 @@ TEST_F(DeformTest, CompareCountsWhatLiesWithinTheBand) {
   EXPECT_THAT(Run({"compare", "a.vtu", "b.vtu"}).out, HasSubstr("excludes model and surgical"));
 }
 
-TEST_F(DeformTest, ElasticResultsTellWhatHoldsTheTissueAndWhatItStores) {
+TEST_F(DeformTest, ElasticResultsReportReactionForcesAndStresses) {
   ASSERT_OK_AND_ASSIGN(const TetMeshFile rest, ReadTetMesh(TestDataPath("plans/bar/bar.vtu")));
   for (const std::string model : {"linear_elastic", "neo_hookean"}) {
     ASSERT_THAT(Run({"deform", TestDataPath("plans/bar/plan.json"), "--out", "out.vtu", "--model",
@@ -212,7 +212,7 @@ TEST_F(DeformTest, ElasticResultsTellWhatHoldsTheTissueAndWhatItStores) {
   }
 }
 
-TEST_F(DeformTest, ATetThatIsInvertedIsToldOf) {
+TEST_F(DeformTest, InvertedTetIsReported) {
   nlohmann::json plan = BarPlan();
   plan["handles"][0]["pose"] = {{"translation_mm", {0, 0, -70}}};
   std::filesystem::copy_file(TestDataPath("plans/bar/bar.vtu"), Path("bar.vtu"));
@@ -222,7 +222,7 @@ TEST_F(DeformTest, ATetThatIsInvertedIsToldOf) {
   EXPECT_THAT(result.err, HasSubstr("inverted, the worst is tet "));
 }
 
-TEST_F(DeformTest, AMovementThatCannotBeReachedIsToldOf) {
+TEST_F(DeformTest, UnreachableMovementIsReported) {
   nlohmann::json plan = BarPlan();
   plan["handles"][0]["pose"] = {{"translation_mm", {0, 0, -70}}};
   plan["model"] = "neo_hookean";
@@ -306,7 +306,7 @@ TEST_F(DeformTest, RasPlanGivesTheLpsResultWrittenInRas) {
   }
 }
 
-TEST_F(DeformTest, StatsTellCountsTimesAndQuality) {
+TEST_F(DeformTest, StatsReportCountsTimesAndQuality) {
   ASSERT_THAT(Run({"deform", TestDataPath("plans/tongue/plan.json"), "--out", "out.vtu", "--stats",
                    "stats.json"}),
               Succeeds());
@@ -427,7 +427,7 @@ TEST_F(DeformTest, ContactIsReportedAndCanBeTurnedOff) {
   EXPECT_NE(Read("off.vtu"), Read("on.vtu"));
 }
 
-TEST_F(DeformTest, WithContactOffTheResultsArrayTellsOfNone) {
+TEST_F(DeformTest, WithContactOffTheResultArrayHasNoContacts) {
   const std::string plan = TestDataPath("plans/head_lips/plan.json");
   const auto contact_of = [&](const std::string& use) {
     EXPECT_THAT(Run({"deform", plan, "--out", "a.vtu", "--contact", use}), Succeeds());

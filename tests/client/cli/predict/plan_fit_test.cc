@@ -86,7 +86,7 @@ TEST_F(PlanFitTest, DeformOfTheFittedPlanDoesWhatWasWanted) {
   EXPECT_LT((Displacement("fitted.json", kVertex) - Vector3d(1.5, -1, 0.5)).norm(), 0.01);
 }
 
-TEST_F(PlanFitTest, JsonTellsAllWithUnitsAndNotice) {
+TEST_F(PlanFitTest, JsonReportsAllResultsWithUnitsAndNotice) {
   const ProcessResult result = Fit({"--json"});
   EXPECT_THAT(result, Succeeds());
   const Json json = Json::parse(result.out);
@@ -113,7 +113,7 @@ TEST_F(PlanFitTest, TargetsThatAreNotReachedEndWithOneAndThePlanIsWritten) {
   EXPECT_THAT(accepted.out, AllOf(HasSubstr("NOT REACHED"), HasSubstr("held by its upper bound")));
 }
 
-TEST_F(PlanFitTest, ContradictoryTargetsAreBothTold) {
+TEST_F(PlanFitTest, ContradictoryTargetsAreBothReported) {
   Json other = targets_["targets"][0];
   other["name"] = "same side";
   other["by_mm"] = -2;

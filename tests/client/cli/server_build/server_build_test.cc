@@ -167,10 +167,10 @@ int ServerBuildTest::ExitCodeAfterSignal(const std::vector<std::string>& words, 
     _exit(127);
   }
   close(ends[1]);
-  std::string told;
+  std::string printed;
   char next = 0;
-  while (std::ranges::count(told, '\n') < lines && read(ends[0], &next, 1) == 1) told += next;
-  EXPECT_THAT(told, Not(HasSubstr("reading the plan from the server")));
+  while (std::ranges::count(printed, '\n') < lines && read(ends[0], &next, 1) == 1) printed += next;
+  EXPECT_THAT(printed, Not(HasSubstr("reading the plan from the server")));
   kill(child, signal_number);
   int status = 0;
   waitpid(child, &status, 0);

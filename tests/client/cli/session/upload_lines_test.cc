@@ -38,7 +38,7 @@ TEST_F(UploadLinesTest, ALongOneSaysALineASecond) {
                                   "uploading: 2.4 of 3.0 MB", "uploading: 3.0 of 3.0 MB"));
 }
 
-TEST_F(UploadLinesTest, WhatHappenedIsSaidAtOnce) {
+TEST_F(UploadLinesTest, EventsAreReportedAtOnce) {
   options_.on_resumed(1'500'000, 3'000'000);
   options_.on_interrupted(absl::UnavailableError("nobody is there"));
   options_.on_resumed(0, 3'000'000);
@@ -47,7 +47,7 @@ TEST_F(UploadLinesTest, WhatHappenedIsSaidAtOnce) {
                                   "the upload restarts"));
 }
 
-TEST_F(UploadLinesTest, AttemptsThatFailAlikeAreNotAllTold) {
+TEST_F(UploadLinesTest, RepeatedFailuresAreNotAllReported) {
   for (now_s_ = 0; now_s_ < 19; now_s_ += 2) {
     options_.on_interrupted(absl::AbortedError("another client sends"));
     options_.on_resumed(1'500'000, 3'000'000);

@@ -23,14 +23,14 @@ class AccuracyRunTest : public ::testing::Test {
 
   absl::StatusOr<std::vector<AccuracyResult>> Run(const std::vector<double>& poisson_ratios) {
     return RunAccuracyCase(bend_, poisson_ratios, folder_,
-                           [this](const std::string& line) { told_ += line + "\n"; });
+                           [this](const std::string& line) { reported_ += line + "\n"; });
   }
 
   const AccuracyCase bend_ = BendCase(2).value();
   // One for each test: tests run at the same time.
   const std::string folder_ = ::testing::TempDir() + "/accuracy_run_test." +
                               ::testing::UnitTest::GetInstance()->current_test_info()->name();
-  std::string told_;
+  std::string reported_;
 };
 
 TEST_F(AccuracyRunTest, EveryModelAnswersAndOnlyElasticOnesDependOnPoissonsRatio) {
@@ -58,7 +58,7 @@ TEST_F(AccuracyRunTest, TableHasARowForEachModelReferenceAndRegion) {
 
 // Answers that are no model's, so that every figure is known: all vertices lie as the reference has
 // them but one of the chin, which is 3 mm off.
-TEST_F(AccuracyRunTest, PlacesOfSkinHaveRowsOfTheirOwnAndTellWhatIsOverTheAcceptedDistance) {
+TEST_F(AccuracyRunTest, SkinPlacesHaveOwnRowsAndReportExceededDistances) {
   AccuracyCase bend = bend_;
   bend.places = {{"chin", {0, 1, 2, 3}}, {"nose", {4, 5}}};
   AccuracyResult result;
@@ -85,14 +85,14 @@ TEST_F(AccuracyRunTest, MissingProgramEndsTheRun) {
   EXPECT_TRUE(absl::IsNotFound(Run({0.3}).status()));
 }
 
-TEST_F(AccuracyRunTest, ReferenceThatIsNotFoundIsToldOfAndLeftOut) {
+TEST_F(AccuracyRunTest, MissingReferenceIsReportedAndLeftOut) {
   std::filesystem::create_symlink("/bin/false", folder_ + "/ccx");
   const testing::ScopedEnvironment programs("PATH", folder_.c_str());
   ASSERT_OK_AND_ASSIGN(const auto results, Run({0.3}));
   EXPECT_TRUE(results[0].references.empty());
   EXPECT_EQ(results[0].Reference("calculix_linear"), nullptr);
   EXPECT_EQ(results[0].models.size(), AllModelVariants().size());
-  EXPECT_THAT(told_, HasSubstr("bar_bend, nu = 0.3: ccx failed"));
+  EXPECT_THAT(reported_, HasSubstr("bar_bend, nu = 0.3: ccx failed"));
 }
 
 }  // namespace

@@ -134,7 +134,7 @@ TEST_F(CalculixTest, StepThatDidNotEndIsAnError) {
   EXPECT_FALSE(ParseCalculixDisplacements("", 1).ok());
 }
 
-TEST_F(CalculixTest, ForcesAndStressesAreToldApartAndStressesPutTogetherFromTheirTissues) {
+TEST_F(CalculixTest, ForcesAndStressesAreDistinguishedAndStressesOfTissuesMerged) {
   constexpr char kDat[] =
       "\n displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n"
       "         1  2.000000E+00 -3.000000E-01  0.000000E+00\n"

@@ -37,7 +37,7 @@ AccuracyResult MovedAsKnown(const AccuracyCase& bar) {
   return result;
 }
 
-TEST(MovementTableTest, MovementIsToldInTheDirectionsOfThePatient) {
+TEST(MovementTableTest, MovementIsReportedInPatientDirections) {
   const AccuracyCase bar = BarWithChin();
   CsvTable table = MovementTable();
   AddMovementRows(bar, {MovedAsKnown(bar)}, &table);
@@ -47,7 +47,7 @@ TEST(MovementTableTest, MovementIsToldInTheDirectionsOfThePatient) {
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 1 + 7);
 }
 
-TEST(MovementTableTest, SummaryTellsForemostAndMeanOfEachModel) {
+TEST(MovementTableTest, SummaryReportsForemostPointAndMeanOfEachModel) {
   const AccuracyCase bar = BarWithChin();
   CsvTable table = MovementSummary();
   AddMovementSummaryRows(bar, MovedAsKnown(bar), &table);

@@ -29,7 +29,7 @@ TEST(PictureAges, AreNotMadeYoungerByAnOldPoseThatIsShownLate) {
   EXPECT_THAT(PictureAges(0, 40, frames), ElementsAre(0, 10, 20, 10, 20));
 }
 
-TEST(PictureAges, TellDroppedPosesThatLatencyHides) {
+TEST(PictureAges, RevealDroppedPosesThatLatencyHides) {
   // One pose in ten is answered, each 5 ms after it was sent: every latency is 5 ms.
   std::vector<ShownFrame> frames;
   frames.reserve(10);

@@ -177,7 +177,7 @@ TEST_F(AuditedPacsClientTest, AFetchThatFailsIsAudited) {
   EXPECT_THAT(Events(), ElementsAre("110104 8 ")) << "the sink tells what has come";
 }
 
-TEST_F(AuditedPacsClientTest, WhatIsStoredBeginsAndEnds) {
+TEST_F(AuditedPacsClientTest, StoreRecordsBeginAndEnd) {
   EXPECT_THAT(pacs_->Store(series_.files), IsOk());
   fake_->takes = 2;
   EXPECT_THAT(pacs_->Store(series_.files), IsOk());

@@ -106,7 +106,7 @@ TEST_F(AuditedSinkTest, StudiesPatientsAndAssociationsAreApart) {
                             "110104 0 1.2,A 1", "110104 0 1.3,B 1", "110104 0 1.2,A 1"));
 }
 
-TEST_F(AuditedSinkTest, WhatIsRefusedIsAnEventOfItsOwn) {
+TEST_F(AuditedSinkTest, RefusalIsASeparateEvent) {
   EXPECT_THAT(Keep(1, "1.2", "A"), IsOk());
   counting_.answer = absl::AlreadyExistsError("other bytes");
   EXPECT_THAT(Keep(1, "1.2", "A"), StatusIs(absl::StatusCode::kAlreadyExists));
@@ -132,7 +132,7 @@ TEST_F(AuditedSinkTest, WhileTheAuditTakesNothingNothingIsReceived) {
               ::testing::ElementsAre("110100 0  ", "110102 0 1.2,A ", "110104 0 1.2,A 2"));
 }
 
-TEST_F(AuditedSinkTest, TheEndOfTheProcessIsTold) {
+TEST_F(AuditedSinkTest, ProcessEndIsRecorded) {
   sink_.reset();
   audit_.reset();
   ASSERT_EQ(record_.messages().size(), 2);

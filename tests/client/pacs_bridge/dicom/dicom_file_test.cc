@@ -49,7 +49,7 @@ TEST(DicomFile, AHeaderHasNeitherPixelsNorPrivateElementsAndOneReader) {
   EXPECT_EQ(ReadInstanceHeader(header)->instance_uid, series.instance_uids[0]);
 }
 
-TEST(DicomFile, AFullDiskIsToldOfTheSmallestFileAndNothingIsLeft) {
+TEST(DicomFile, FullDiskIsReportedForTheSmallestFileAndNothingIsLeft) {
   const fs::path folder = EmptyTestFolder("dicom_full_disk");
   const CtSeries series = OneSlice(folder);
   rlimit before = {};
@@ -109,7 +109,7 @@ TEST(DicomFile, PatientAndStudyAreCopiedWholeAndNothingElse) {
   EXPECT_FALSE(copy.tagExists(DCM_ImagePositionPatient));
 }
 
-TEST(DicomFile, WhatIsNoDicomFileIsRefused) {
+TEST(DicomFile, InvalidDicomFileIsRefused) {
   const fs::path folder = EmptyTestFolder("dicom_bad");
   EXPECT_THAT(LoadDicomHeader(folder / "none").status(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("there is no such file")));
@@ -146,7 +146,7 @@ TEST(DicomFile, ItemsWithinItemsEndAtALimitAndNotWithTheStack) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("damaged, truncated")));
 }
 
-TEST(DicomFile, WhatIsDeflatedIsRefused) {
+TEST(DicomFile, DeflatedFileIsRefused) {
   const fs::path folder = EmptyTestFolder("dicom_deflated");
   const CtSeries series = OneSlice(folder);
   DcmFileFormat file;

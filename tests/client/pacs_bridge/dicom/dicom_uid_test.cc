@@ -23,7 +23,7 @@ TEST(DicomUid, NewOnesAreUidsOfTheirOwn) {
   EXPECT_EQ(uids.size(), 1000u);
 }
 
-TEST(DicomUid, WhatIsNoUidIsTold) {
+TEST(DicomUid, InvalidUidIsRecognized) {
   EXPECT_TRUE(IsDicomUid("1.2.840.10008.1.1"));
   EXPECT_TRUE(IsDicomUid("1.0.3"));
   EXPECT_TRUE(IsDicomUid(std::string(64, '1')));

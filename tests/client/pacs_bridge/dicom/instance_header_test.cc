@@ -58,7 +58,7 @@ TEST(InstanceHeader, SaysWhatTheSliceSays) {
   EXPECT_EQ(header->text_problem, "");
 }
 
-TEST(InstanceHeader, ACharacterSetThatNobodyKnowsIsToldAndNotGuessed) {
+TEST(InstanceHeader, UnknownCharacterSetIsReportedAndNotGuessed) {
   CtSeriesOptions options;
   options.slices = 1;
   options.character_set = "ISO_IR 4711";
@@ -75,7 +75,7 @@ TEST(InstanceHeader, AnAsciiNameNeedsNoCharacterSet) {
   EXPECT_EQ(HeaderOf("ascii", options).patient_name, "Planted^Patricia^Q");
 }
 
-TEST(InstanceHeader, ANameOfAHundredThousandCharactersIsCutAndTold) {
+TEST(InstanceHeader, NameOfAHundredThousandCharactersIsCutAndReported) {
   CtSeriesOptions options;
   options.slices = 1;
   options.character_set = "ISO_IR 192";

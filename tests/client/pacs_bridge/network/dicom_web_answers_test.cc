@@ -33,42 +33,42 @@ std::string Answer(const std::string& failed, const std::string& stored) {
 }
 const char* const kEmpty = R"({"vr":"SQ"})";
 
-absl::Status Told(const std::string& text, int http_status) {
+absl::Status StatusOf(const std::string& text, int http_status) {
   return StatusOfStow("p", text, kUid, http_status);
 }
 
 TEST(StatusOfStow, IsOkWhereTheObjectIsListedAsStored) {
-  EXPECT_THAT(Told(Answer(kEmpty, Sequence(kUid)), 200), IsOk());
-  EXPECT_THAT(Told(Answer("", Sequence(kUid)), 200), IsOk());
-  EXPECT_THAT(Told(Answer(Sequence("2.25.1", 0x0110), Sequence(kUid)), 200), IsOk());
+  EXPECT_THAT(StatusOf(Answer(kEmpty, Sequence(kUid)), 200), IsOk());
+  EXPECT_THAT(StatusOf(Answer("", Sequence(kUid)), 200), IsOk());
+  EXPECT_THAT(StatusOf(Answer(Sequence("2.25.1", 0x0110), Sequence(kUid)), 200), IsOk());
 }
 
 TEST(StatusOfStow, IsOkWhereItIsStoredWithWarnings) {
   std::string warned = Sequence(kUid);
   warned.insert(warned.size() - 3, R"(,"00081196":{"vr":"US","Value":[45056]})");
-  EXPECT_THAT(Told(Answer("", warned), 202), IsOk());
+  EXPECT_THAT(StatusOf(Answer("", warned), 202), IsOk());
 }
 
 TEST(StatusOfStow, IsARefusalWhereTheObjectIsListedAsFailedBesideAnEmptyList) {
   for (const int http_status : {200, 202, 409}) {
-    EXPECT_THAT(Told(Answer(Sequence(kUid, 0x0122), kEmpty), http_status),
+    EXPECT_THAT(StatusOf(Answer(Sequence(kUid, 0x0122), kEmpty), http_status),
                 StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("0x0122")));
   }
-  EXPECT_THAT(Told(Answer(Sequence(kUid, 0x0122), Sequence("2.25.1")), 200),
+  EXPECT_THAT(StatusOf(Answer(Sequence(kUid, 0x0122), Sequence("2.25.1")), 200),
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr(kUid)));
 }
 
 TEST(StatusOfStow, IsOkForADuplicate) {
-  EXPECT_THAT(Told(Answer(Sequence(kUid, 0x0111), ""), 409), IsOk());
-  EXPECT_THAT(Told(Answer(Sequence(kUid, 0x0111), kEmpty), 200), IsOk());
+  EXPECT_THAT(StatusOf(Answer(Sequence(kUid, 0x0111), ""), 409), IsOk());
+  EXPECT_THAT(StatusOf(Answer(Sequence(kUid, 0x0111), kEmpty), 200), IsOk());
 }
 
 TEST(StatusOfStow, ComesAgainWhereThereIsNoRoom) {
   for (const int reason : {0xA700, 0xA7FF}) {
-    EXPECT_THAT(Told(Answer(Sequence(kUid, reason), kEmpty), 409),
+    EXPECT_THAT(StatusOf(Answer(Sequence(kUid, reason), kEmpty), 409),
                 StatusIs(absl::StatusCode::kUnavailable, HasSubstr("no room")));
   }
-  EXPECT_THAT(Told(Answer(Sequence(kUid, 0xA800), kEmpty), 409),
+  EXPECT_THAT(StatusOf(Answer(Sequence(kUid, 0xA800), kEmpty), 409),
               StatusIs(absl::StatusCode::kFailedPrecondition));
 }
 
@@ -76,10 +76,11 @@ TEST(StatusOfStow, ComesAgainWhereNothingIsSaidOfTheObject) {
   for (const std::string& text :
        {Answer(kEmpty, kEmpty), Answer("", ""), Answer("", Sequence("2.25.1")), std::string(kUid),
         std::string(), std::string(R"({"00081199":"2.25.4711"})")}) {
-    EXPECT_THAT(Told(text, 200), StatusIs(absl::StatusCode::kUnavailable, HasSubstr(kUid))) << text;
+    EXPECT_THAT(StatusOf(text, 200), StatusIs(absl::StatusCode::kUnavailable, HasSubstr(kUid)))
+        << text;
   }
-  EXPECT_THAT(Told("", 409), StatusIs(absl::StatusCode::kFailedPrecondition));
-  EXPECT_THAT(Told(Answer("", Sequence(kUid)), 409),
+  EXPECT_THAT(StatusOf("", 409), StatusIs(absl::StatusCode::kFailedPrecondition));
+  EXPECT_THAT(StatusOf(Answer("", Sequence(kUid)), 409),
               StatusIs(absl::StatusCode::kFailedPrecondition))
       << "all were refused";
 }

@@ -47,7 +47,7 @@ class InstanceFolderTest : public ::testing::Test {
   std::unique_ptr<InstanceFolder> folder_;
 };
 
-TEST_F(InstanceFolderTest, WhatIsNotAsAnnouncedIsRefusedAndGone) {
+TEST_F(InstanceFolderTest, InstanceThatDiffersFromItsAnnouncementIsRefusedAndRemoved) {
   const std::string bytes = BytesOfFile(series_.files[0]);
   EXPECT_THAT(Take(bytes, {.instance_uid = "1.2.3"}).status(),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("another object or class")));
@@ -59,7 +59,7 @@ TEST_F(InstanceFolderTest, WhatIsNotAsAnnouncedIsRefusedAndGone) {
   EXPECT_THAT(sink_.instances(), IsEmpty());
 }
 
-TEST_F(InstanceFolderTest, WhatACrashLeftHalfWrittenGoesWhenItIsOpened) {
+TEST_F(InstanceFolderTest, OpeningRemovesPartialFilesOfACrash) {
   EXPECT_THAT(Take(BytesOfFile(series_.files[0]), {}).status(), IsOk());
   WriteTestFile(path_ / "2.25.1.partial", "half");
   const auto again = InstanceFolder::Open({.path = path_, .watermark_bytes = 0});
@@ -79,7 +79,7 @@ TEST_F(InstanceFolderTest, AnObjectIsKnownAgainAfterARestart) {
   EXPECT_EQ(second->path, first->path);
 }
 
-TEST_F(InstanceFolderTest, AFolderThatIsNotThereIsTold) {
+TEST_F(InstanceFolderTest, MissingFolderIsReported) {
   EXPECT_THAT(InstanceFolder::Open({.path = path_ / "none"}).status(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("make it")));
 }

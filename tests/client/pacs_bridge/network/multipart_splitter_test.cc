@@ -61,7 +61,7 @@ TEST(MultipartSplitter, PartsAreTheSameInPiecesOfAnySize) {
   }
 }
 
-TEST(MultipartSplitter, WhatEndsTooEarlyIsTold) {
+TEST(MultipartSplitter, TruncatedBodyIsReported) {
   for (const std::string& body :
        {std::string(), std::string("--cut here\r\n\r\nhalf a part"),
         std::string("--cut here\r\n\r\nwhole\r\n--cut here"), std::string("no boundary")}) {

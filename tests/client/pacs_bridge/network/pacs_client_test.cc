@@ -176,7 +176,7 @@ class PacsHeaderTest : public PacsClientTest {};
 class TlsPacsClientTest : public PacsClientTest {};
 class WebPacsClientTest : public PacsClientTest {};
 
-TEST_P(PacsClientTest, WhatIsStoredIsFoundAndComesBackToTheLastBit) {
+TEST_P(PacsClientTest, StoredSeriesIsFoundAndReturnsBitIdentical) {
   CtSeriesOptions options;
   options.slices = 3;
   options.character_set = "ISO_IR 100";
@@ -282,7 +282,7 @@ TEST_P(TlsPacsClientTest, WithoutACertificateOfTheAuthorityNobodyIsServed) {
               StatusIs(absl::StatusCode::kUnauthenticated, HasSubstr("'orthanc'")));
 }
 
-TEST_P(WebPacsClientTest, WhatItsDiskDoesNotTakeIsNotStored) {
+TEST_P(WebPacsClientTest, ObjectThatTheDiskRefusesIsNotStored) {
   const CtSeries series = WriteCtSeries(home_ / "sent", {.slices = 1});
   // Files where Orthanc wants to have folders: it answers 200 although it keeps nothing.
   std::vector<fs::path> in_the_way;
@@ -332,7 +332,7 @@ INSTANTIATE_TEST_SUITE_P(All, PacsHeaderTest, ::testing::Values(kGet, kWeb, kGet
 INSTANTIATE_TEST_SUITE_P(All, TlsPacsClientTest, ::testing::Values(kGetTls, kWebTls), NameOfKind);
 INSTANTIATE_TEST_SUITE_P(All, WebPacsClientTest, ::testing::Values(kWeb), NameOfKind);
 
-TEST(PacsClient, WrongTitlesAreToldApart) {
+TEST(PacsClient, WrongTitlesAreDistinguished) {
   RecordingSink sink;
   const fs::path received = EmptyTestFolder("client_titles");
   const auto folder = *InstanceFolder::Open({.path = received, .watermark_bytes = 0});
@@ -356,7 +356,7 @@ TEST(PacsClient, WrongTitlesAreToldApart) {
               StatusIs(absl::StatusCode::kPermissionDenied, HasSubstr("is not called ELSEWHERE")));
 }
 
-TEST(PacsClient, AnObjectThatIsRefusedIsToldByItsUid) {
+TEST(PacsClient, RefusedObjectIsReportedByItsUid) {
   RecordingSink sink;
   sink.Answer(absl::InternalError("not now"));
   const auto folder =
@@ -411,7 +411,7 @@ TEST(PacsClient, ServersThatTakeOneSpellingOfTheBoundaryGetIt) {
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("HTTP status 400")));
 }
 
-TEST(PacsClient, PeersThatCannotBeAreTold) {
+TEST(PacsClient, InvalidPeersAreReported) {
   PacsPeer peer;
   peer.name = "p";
   EXPECT_THAT(MakePacsClient(peer).status(),

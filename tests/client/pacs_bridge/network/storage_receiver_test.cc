@@ -154,7 +154,7 @@ TEST_F(StorageReceiverTest, WrongAndUnknownTitlesAndAddressesAreRefused) {
                                                     "127.0.0.1 : unknown address"));
 }
 
-TEST_F(StorageReceiverTest, AtTheWatermarkTheSenderIsToldThatThereIsNoRoom) {
+TEST_F(StorageReceiverTest, AtTheWatermarkTheSenderReceivesOutOfResources) {
   folder_options_.watermark_bytes = int64_t{1} << 60;
   Start();
   const ProgramEnd end = Send(WriteCtSeries(sent_, {.slices = 2}).files, {"+v", "-d"});
@@ -166,7 +166,7 @@ TEST_F(StorageReceiverTest, AtTheWatermarkTheSenderIsToldThatThereIsNoRoom) {
   EXPECT_THAT(Received(), IsEmpty());
 }
 
-TEST_F(StorageReceiverTest, WhatTheSinkDoesNotTakeIsNotLeftBehind) {
+TEST_F(StorageReceiverTest, InstanceThatTheSinkRefusesIsRemoved) {
   Start();
   sink_.Answer(absl::InternalError("the queue is shut"));
   const ProgramEnd end = Send(WriteCtSeries(sent_, {.slices = 1}).files, {"-d"});
@@ -174,7 +174,7 @@ TEST_F(StorageReceiverTest, WhatTheSinkDoesNotTakeIsNotLeftBehind) {
   EXPECT_THAT(Received(), IsEmpty());
 }
 
-TEST_F(StorageReceiverTest, WhatComesTwiceIsKeptOnceAndWhatHasChangedApart) {
+TEST_F(StorageReceiverTest, DuplicateIsKeptOnceAndChangedInstanceSeparately) {
   Start();
   const CtSeries series = WriteCtSeries(sent_, {.slices = 1});
   EXPECT_EQ(Send(series.files).exit_code, 0);
@@ -214,7 +214,7 @@ TEST_F(StorageReceiverTest, NamesOfAHundredThousandCharactersAndOfOtherSetsAreKe
   EXPECT_EQ(DataSetOfFile(sink_.instances()[1].path), DataSetOfFile(japanese.files[0]));
 }
 
-TEST_F(StorageReceiverTest, PatientsThatAreMixedInOneAssociationAreEachToldAsTheyAre) {
+TEST_F(StorageReceiverTest, MixedPatientsInOneAssociationAreReportedSeparately) {
   Start();
   CtSeriesOptions other;
   other.patient_id = "OTHER";
@@ -274,7 +274,7 @@ class Silent {
   bool connected_ = false;
 };
 
-TEST_F(StorageReceiverTest, WhoeverConnectsAndSaysNothingHoldsNobodyUp) {
+TEST_F(StorageReceiverTest, SilentConnectionsDoNotBlockOthers) {
   Start();
   const Silent one(receiver_->port());
   const Silent other(receiver_->port());
@@ -346,7 +346,7 @@ TEST_F(StorageReceiverTest, StoppingBreaksOffWhatIsOpen) {
   EXPECT_EQ(one.ReadAll(), "");
 }
 
-TEST(StorageReceiver, OptionsThatCannotBeAreTold) {
+TEST(StorageReceiver, InvalidOptionsAreReported) {
   RecordingSink sink;
   const auto folder = InstanceFolder::Open({.path = EmptyTestFolder("receiver_options").string()});
   ASSERT_THAT(folder.status(), IsOk());

@@ -85,7 +85,7 @@ TEST_F(OtherReadersTest, PydicomFindsWhatTheTableSays) {
   EXPECT_EQ(ReadByPydicom(), 0) << Said();
 }
 
-TEST_F(OtherReadersTest, PydicomTellsWhatTheTableDoesNotSay) {
+TEST_F(OtherReadersTest, PydicomReportsDeviationsFromTheTable) {
   ASSERT_TRUE(HasModule("pydicom")) << "python3-pydicom is not installed";
   const PredictionObjectsInput input = MakeInput();
   WriteManifest(input);

@@ -84,7 +84,7 @@ class BridgeCrashTest : public ::testing::Test {
     const auto queue = BridgeQueue::Open(state());
     ASSERT_THAT(queue, IsOk());
     EXPECT_EQ(ReceivedRows(queue->get()).List()->size(), 1);
-    EXPECT_EQ(ExportRows(queue->get()).Get("exports/1")->state, BridgeExportState::kTold);
+    EXPECT_EQ(ExportRows(queue->get()).Get("exports/1")->state, BridgeExportState::kReported);
     EXPECT_EQ(stores.size(), kObjects) << "nothing was sent twice";
   }
 
@@ -116,7 +116,7 @@ TEST_F(BridgeCrashTest, DeathAfterDeathComesToTheEnd) {
   ExpectOneOfEach();
 }
 
-TEST_F(BridgeCrashTest, WhatAPersonIsToldOfAMergedPatientOutlivesEveryDeath) {
+TEST_F(BridgeCrashTest, NoteAboutMergedPatientSurvivesEveryCrash) {
   Begin("bridge_crash_merged_none");
   Merge();
   int points = 0;

@@ -134,7 +134,7 @@ TEST_F(BridgeServiceTest, AnExportThatIsDrawnHoldsUpNoOther) {
   slow_.LetGo();
 }
 
-TEST_F(BridgeServiceTest, WhatIsConfirmedWhileItIsDrawnIsDrawnOnce) {
+TEST_F(BridgeServiceTest, ExportConfirmedWhileItIsDrawnIsDrawnOnce) {
   const auto service = Serve();
   EXPECT_TRUE(log_.WaitFor("draws"));
   Confirm("exports/1");
@@ -146,7 +146,7 @@ TEST_F(BridgeServiceTest, WhatIsConfirmedWhileItIsDrawnIsDrawnOnce) {
   EXPECT_EQ(slow_.drawn(), 1);
 }
 
-TEST_F(BridgeServiceTest, AThreadThatHangsIsToldThoughTheOthersGoOn) {
+TEST_F(BridgeServiceTest, HungThreadIsReportedWhileTheOthersContinue) {
   const auto service = Serve();
   EXPECT_TRUE(log_.WaitFor("draws"));
   EXPECT_THAT(service->Stuck(), ::testing::IsEmpty());
@@ -183,7 +183,7 @@ TEST_F(BridgeServiceTest, PicturesThatFailOnceAreDrawnAgain) {
   EXPECT_TRUE(log_.WaitFor("draws again"));
 }
 
-TEST_F(BridgeServiceTest, WhatWasTakenBackIsLookedFor) {
+TEST_F(BridgeServiceTest, WithdrawnExportsAreDetected) {
   server_->taken_back = {"exports/2"};
   slow_.LetGo();
   const auto service = Serve();
@@ -191,12 +191,15 @@ TEST_F(BridgeServiceTest, WhatWasTakenBackIsLookedFor) {
   EXPECT_EQ(exports_.List()->size(), 1);
 }
 
-// Tells of one export in a watch that lasts, and refuses the first word about it.
+// Reports one export in a watch that lasts, and refuses the first update of it.
 class OnceRefusingServer final : public FolderCaseServer {
  public:
-  OnceRefusingServer(const std::filesystem::path& folder, v1::Export told, absl::Status refusal,
+  OnceRefusingServer(const std::filesystem::path& folder, v1::Export reported, absl::Status refusal,
                      HeardLog* log)
-      : FolderCaseServer(folder), told_(std::move(told)), refusal_(std::move(refusal)), log_(log) {}
+      : FolderCaseServer(folder),
+        reported_(std::move(reported)),
+        refusal_(std::move(refusal)),
+        log_(log) {}
 
   absl::Status UpdateExport(const std::string& name, v1::ExportState state,
                             const std::string& detail, int stored) override {
@@ -206,9 +209,9 @@ class OnceRefusingServer final : public FolderCaseServer {
     log_->Add("the server hears of " + name);
     return FolderCaseServer::UpdateExport(name, state, detail, stored);
   }
-  absl::Status WatchExports(const std::function<void(const v1::Export&)>& tell,
+  absl::Status WatchExports(const std::function<void(const v1::Export&)>& on_export,
                             const Cancellation& cancelled) override {
-    tell(told_);
+    on_export(reported_);
     MutexLock lock(mutex_);
     while (!cancelled.requested()) {
       changed_.WaitUntil(mutex_, std::chrono::steady_clock::now() + std::chrono::milliseconds(50));
@@ -217,7 +220,7 @@ class OnceRefusingServer final : public FolderCaseServer {
   }
 
  private:
-  const v1::Export told_;
+  const v1::Export reported_;
   absl::Status refusal_;  // of the thread that works on exports
   HeardLog* const log_;
   Mutex mutex_;
@@ -228,11 +231,11 @@ class RefusedWordTest : public BridgeServiceTest,
                         public ::testing::WithParamInterface<absl::StatusCode> {};
 
 TEST_P(RefusedWordTest, IsSaidAgainThoughTheWatchGoesOn) {
-  v1::Export told;
-  told.set_name("exports/1");
-  told.set_case_(exports_.Get("exports/1")->case_name);
-  told.set_state(v1::EXPORT_STATE_WAITING);
-  OnceRefusingServer server(root_ / "server", told, absl::Status(GetParam(), "gone"), &log_);
+  v1::Export reported;
+  reported.set_name("exports/1");
+  reported.set_case_(exports_.Get("exports/1")->case_name);
+  reported.set_state(v1::EXPORT_STATE_WAITING);
+  OnceRefusingServer server(root_ / "server", reported, absl::Status(GetParam(), "gone"), &log_);
   ExportWork work(queue_.get(), &server, pacs_.get(), &writer_, ExportWorkOptions());
   const BridgeService service({.queue = queue_.get(), .exports = &work, .server = &server});
   EXPECT_TRUE(log_.WaitFor("the server hears of exports/1"));

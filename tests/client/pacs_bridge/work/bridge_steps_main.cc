@@ -80,15 +80,15 @@ absl::Status DoExport(BridgeQueue* queue, CaseServer* server, PacsClient* pacs,
                       const QueuedSeries& series) {
   testing::HeaderWriter writer;
   ExportWork work(queue, server, pacs, &writer, {});
-  v1::Export told;
-  told.set_name("exports/1");
-  told.set_prediction("predictions/1");
-  told.set_case_(series.case_name);
-  told.set_state(v1::EXPORT_STATE_WAITING);
-  TF_RETURN_IF_ERROR(work.Take(told));
+  v1::Export requested;
+  requested.set_name("exports/1");
+  requested.set_prediction("predictions/1");
+  requested.set_case_(series.case_name);
+  requested.set_state(v1::EXPORT_STATE_WAITING);
+  TF_RETURN_IF_ERROR(work.Take(requested));
   ExportRows rows(queue);
   TF_ASSIGN_OR_RETURN(QueuedExport queued, rows.Get("exports/1"));
-  while (queued.state != BridgeExportState::kTold) {
+  while (queued.state != BridgeExportState::kReported) {
     if (queued.state == BridgeExportState::kAsked) {
       TF_ASSIGN_OR_RETURN(const QueuedStudy study, ReceivedRows(queue).GetStudy(series.study_uid));
       TF_RETURN_IF_ERROR(rows.Confirm("exports/1", DigestOf(study.patient)));

@@ -122,12 +122,12 @@ class BridgeWork : public ::testing::Test {
     return series;
   }
   void Ask(const std::string& name, const CtSeries& series) {
-    v1::Export told;
-    told.set_name(name);
-    told.set_prediction("predictions/1");
-    told.set_case_(rows_.GetByUid(series.series_uid)->case_name);
-    told.set_state(v1::EXPORT_STATE_WAITING);
-    ASSERT_THAT(work_->Take(told), IsOk());
+    v1::Export requested;
+    requested.set_name(name);
+    requested.set_prediction("predictions/1");
+    requested.set_case_(rows_.GetByUid(series.series_uid)->case_name);
+    requested.set_state(v1::EXPORT_STATE_WAITING);
+    ASSERT_THAT(work_->Take(requested), IsOk());
   }
   void Confirm(const std::string& name) {
     const QueuedSeries series = *rows_.GetByCase(exports_.Get(name)->case_name);

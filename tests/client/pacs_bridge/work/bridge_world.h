@@ -146,7 +146,7 @@ class FolderPacs final : public PacsClient {
       TF_ASSIGN_OR_RETURN(const InstanceHeader header, ReadInstanceHeader(file));
       if (header.study_uid != study) continue;
       PatientSummary patient = {.name = header.patient_name + "^^", .id = header.patient_id};
-      if (tells_optional_keys) {
+      if (returns_optional_keys) {
         patient.issuer = header.issuer_of_patient_id;
         patient.birth_date = header.birth_date;
       }
@@ -183,7 +183,7 @@ class FolderPacs final : public PacsClient {
   absl::Status away = {};
   absl::Status header_service = {};  // C-GET
   absl::Status query_service = {};   // C-FIND, of a study's patient
-  bool tells_optional_keys = true;
+  bool returns_optional_keys = true;
 
  private:
   const std::filesystem::path folder_;

@@ -39,13 +39,14 @@ class DraftWorkTest : public BridgeWork {
     EXPECT_EQ(StateOf(received_), SeriesState::kDrafting);
     QueuedSeries series = *rows_.GetByUid(received_.series_uid);
     EXPECT_THAT(server_->SendDraft("ct", TitleOfSeries(series.key), "{}"), IsOk());
-    EXPECT_THAT(drafts_.Add({.name = Told().name(), .series = series.key, .images = series.images}),
-                IsOk());
+    EXPECT_THAT(
+        drafts_.Add({.name = NewestDraft().name(), .series = series.key, .images = series.images}),
+        IsOk());
     series.state = SeriesState::kDraft;
     EXPECT_THAT(rows_.UpdateStep(series, SeriesState::kDrafting), IsOk());
     return series;
   }
-  v1::BuildDraft& Told() { return server_->drafts.back(); }
+  v1::BuildDraft& NewestDraft() { return server_->drafts.back(); }
   QueuedSeries Now() { return *rows_.GetByUid(received_.series_uid); }
 
   CtSeries received_;
@@ -57,19 +58,19 @@ TEST_F(DraftWorkTest, EachCaseOfADraftIsOneOfItsSeries) {
   const QueuedSeries series = WaitingDraft();
   EXPECT_THAT(*plans_.FollowDrafts(), IsEmpty());
   EXPECT_EQ(Now().done_s, 0) << "its images stay while it waits";
-  Told().add_cases("cases/1");
+  NewestDraft().add_cases("cases/1");
   EXPECT_THAT(*plans_.FollowDrafts(), ElementsAre(series.key));
   EXPECT_EQ(Now().state, SeriesState::kPublished);
   EXPECT_GT(Now().done_s, 0);
   EXPECT_THAT(*plans_.FollowDrafts(), IsEmpty());
-  Told().add_cases("cases/2");
+  NewestDraft().add_cases("cases/2");
   EXPECT_THAT(*plans_.FollowDrafts(), ElementsAre(series.key));
   EXPECT_EQ(Now().case_name, "cases/2");
   for (const char* name : {"cases/1", "cases/2"}) {
     EXPECT_EQ(rows_.GetByCase(name)->key, series.key) << name;
     EXPECT_THAT(*rows_.ListSources(name), SizeIs(series.images)) << name;
   }
-  // The server tells no more of it: its cases stay those of the series.
+  // The server no longer reports it: its cases stay those of the series.
   server_->drafts.clear();
   EXPECT_THAT(*plans_.FollowDrafts(), IsEmpty());
   EXPECT_EQ(Now().state, SeriesState::kPublished);
@@ -84,7 +85,7 @@ TEST_F(DraftWorkTest, ImagesThatComeLateAreNoneOfTheDraft) {
   Settle();
   EXPECT_EQ(Now().state, SeriesState::kDraft);
   EXPECT_EQ(Now().images, 2 * images);
-  Told().add_cases("cases/1");
+  NewestDraft().add_cases("cases/1");
   ASSERT_THAT(plans_.FollowDrafts(), IsOk());
   EXPECT_THAT(*rows_.ListSources("cases/1"), SizeIs(images));
 }
@@ -105,7 +106,7 @@ TEST_F(DraftWorkTest, APlanThatWasBuiltOtherwiseStaysTheOneThatIsShown) {
   WaitingDraft();
   MakeCase(received_);
   const std::string built = Now().case_name;
-  Told().add_cases("cases/1");
+  NewestDraft().add_cases("cases/1");
   EXPECT_THAT(*plans_.FollowDrafts(), IsEmpty());
   EXPECT_EQ(Now().case_name, built);
   EXPECT_THAT(rows_.GetByCase("cases/1"), IsOk()) << "predictions of it can be stored";
@@ -113,18 +114,18 @@ TEST_F(DraftWorkTest, APlanThatWasBuiltOtherwiseStaysTheOneThatIsShown) {
 
 TEST_F(DraftWorkTest, AnExportOfANewCaseIsTakenBeforeTheCaseWasFollowed) {
   WaitingDraft();
-  v1::Export told;
-  told.set_name("exports/1");
-  told.set_prediction("predictions/1");
-  told.set_case_("cases/1");
-  told.set_state(v1::EXPORT_STATE_WAITING);
-  ASSERT_THAT(work_->Take(told), IsOk());
+  v1::Export requested;
+  requested.set_name("exports/1");
+  requested.set_prediction("predictions/1");
+  requested.set_case_("cases/1");
+  requested.set_state(v1::EXPORT_STATE_WAITING);
+  ASSERT_THAT(work_->Take(requested), IsOk());
   EXPECT_THAT(exports_.Get("exports/1"), StatusIs(absl::StatusCode::kNotFound)) << "of another";
-  Told().add_cases("cases/1");
-  ASSERT_THAT(work_->Take(told), IsOk());
+  NewestDraft().add_cases("cases/1");
+  ASSERT_THAT(work_->Take(requested), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kAsked);
   // The page of who confirms shows it, also when another case of the draft is newer.
-  Told().add_cases("cases/2");
+  NewestDraft().add_cases("cases/2");
   ASSERT_THAT(plans_.FollowDrafts(), IsOk());
   ASSERT_OK_AND_ASSIGN(const ReviewQueue list, ReadReviewQueue(queue_.get()));
   ASSERT_THAT(list.exports, SizeIs(1));
@@ -138,7 +139,7 @@ TEST_F(DraftWorkTest, TheReviewPageLeadsToTheDraft) {
   const std::string page = ReviewPage(list, options);
   EXPECT_THAT(page, HasSubstr("waits in the planner for a plan"));
   EXPECT_THAT(page, HasSubstr("https://planner.example.org/#new&amp;draft=1\""));
-  Told().add_cases("cases/1");
+  NewestDraft().add_cases("cases/1");
   ASSERT_THAT(plans_.FollowDrafts(), IsOk());
   ASSERT_OK_AND_ASSIGN(const ReviewQueue later, ReadReviewQueue(queue_.get()));
   EXPECT_THAT(ReviewPage(later, options), Not(HasSubstr("draft=")));

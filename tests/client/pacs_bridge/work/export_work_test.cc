@@ -49,19 +49,19 @@ TEST_F(ExportWorkTest, AnExportGoesToThePacsAfterAPersonsWord) {
   EXPECT_TRUE(Stored().empty());
   Confirm("exports/1");
   EXPECT_THAT(Work("exports/1"), IsOk());
-  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kReported);
   EXPECT_EQ(Stored().size(), 4);
   EXPECT_THAT(Updates(), Contains("exports/1 EXPORT_STATE_STORED 4 "));
   EXPECT_FALSE(fs::exists(queue_->object_folder(exports_.Get("exports/1")->key)));
 }
 
-TEST_F(ExportWorkTest, ABandThatCannotBeToldIsSaidAndTheReportGoesWithoutIt) {
+TEST_F(ExportWorkTest, MissingBandIsReportedAndTheReportOmitsIt) {
   const CtSeries series = ReceiveWithCase("a");
   server_->band = absl::InvalidArgumentError("ranges: 3 tets of 16");
   Ask("exports/1", series);
   Confirm("exports/1");
   EXPECT_THAT(Work("exports/1"), IsOk());
-  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kReported);
   EXPECT_THAT(warnings_, ::testing::ElementsAre(
                              HasSubstr("without a band of uncertainty: ranges: 3 tets of 16")));
 }
@@ -83,7 +83,7 @@ TEST_F(ExportWorkTest, AServerWithoutRoomForABandIsAskedSomeTimesAndNotForever) 
     EXPECT_THAT(Work("exports/1"), StatusIs(absl::StatusCode::kResourceExhausted));
   }
   EXPECT_THAT(Work("exports/1"), IsOk());
-  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kReported);
   EXPECT_THAT(warnings_, ::testing::ElementsAre(HasSubstr("no memory")));
 }
 
@@ -100,7 +100,7 @@ TEST_F(ExportWorkTest, APredictionOfAnotherMeshIsRefused) {
   EXPECT_THAT(Updates(), Contains(HasSubstr("FAILED 0 the prediction has a different mesh")));
 }
 
-TEST_F(ExportWorkTest, WhatIsDrawnOfAnExportThatHasFailedMeanwhileIsRemoved) {
+TEST_F(ExportWorkTest, PicturesOfAFailedExportAreRemoved) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   const QueuedExport asked = *exports_.Get("exports/1");
@@ -112,7 +112,7 @@ TEST_F(ExportWorkTest, WhatIsDrawnOfAnExportThatHasFailedMeanwhileIsRemoved) {
   EXPECT_FALSE(fs::exists(queue_->object_folder(asked.key)));
 }
 
-TEST_F(ExportWorkTest, WhatWasTakenBackLeavesTheQueueWithItsPictures) {
+TEST_F(ExportWorkTest, WithdrawnExportLeavesTheQueueWithItsPictures) {
   const CtSeries series = ReceiveWithCase("a");
   for (const char* name : {"exports/1", "exports/2", "exports/3"}) {
     Ask(name, series);
@@ -142,11 +142,11 @@ TEST_F(ExportWorkTest, ACaseOfAnotherBridgeIsLeftToItWhichIsSaid) {
   ExportWorkOptions options;
   options.inform = [&said](const std::string& line) { said.push_back(line); };
   ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer_, options);
-  v1::Export told;
-  told.set_name("exports/1");
-  told.set_case_("cases/unknown");
-  told.set_state(v1::EXPORT_STATE_WAITING);
-  EXPECT_THAT(work.Take(told), IsOk());
+  v1::Export requested;
+  requested.set_name("exports/1");
+  requested.set_case_("cases/unknown");
+  requested.set_state(v1::EXPORT_STATE_WAITING);
+  EXPECT_THAT(work.Take(requested), IsOk());
   EXPECT_TRUE(exports_.List()->empty());
   EXPECT_THAT(said, ::testing::ElementsAre(HasSubstr("exports/1 has a case of another bridge")));
 }
@@ -179,7 +179,7 @@ TEST_F(ExportWorkTest, APacsThatDoesNotLetUsInMayDoSoLater) {
   EXPECT_EQ(Stored().size(), 4);
 }
 
-TEST_F(ExportWorkTest, AStudyThatWasDeletedIsToldAndNothingIsStored) {
+TEST_F(ExportWorkTest, DeletedStudyIsReportedAndNothingIsStored) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -225,7 +225,7 @@ TEST_F(ExportWorkTest, APatientWhoIsMergedWhileTheServerHearsOfStoringGoesBackTo
   EXPECT_THAT(Updates().back(), HasSubstr("CONFIRMATION 0 the patient's data"));
 }
 
-TEST_F(ExportWorkTest, WhoIsSeenAnewIsWrittenWhenTheServerKnows) {
+TEST_F(ExportWorkTest, ChangedPatientIsWrittenOnlyOnceTheServerKnows) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -254,14 +254,14 @@ class NoHeaderTest : public ExportWorkTest {
 
 TEST_F(NoHeaderTest, TheKeptHeaderStandsIfTheQueryNamesTheSamePatientAndThatIsSaid) {
   EXPECT_THAT(Work("exports/1"), IsOk());
-  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kReported);
   EXPECT_EQ(Stored().size(), 4);
   EXPECT_THAT(exports_.Get("exports/1")->note, HasSubstr("the header that was received on 2"));
   EXPECT_THAT(warnings_, ::testing::ElementsAre(HasSubstr("exports/1: stored with the header")));
 }
 
-TEST_F(NoHeaderTest, WhatAQueryNeedNotTellIsNoOtherPatient) {
-  pacs_->tells_optional_keys = false;
+TEST_F(NoHeaderTest, MissingOptionalKeysAreNotAnotherPatient) {
+  pacs_->returns_optional_keys = false;
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(Stored().size(), 4);
 }
@@ -297,7 +297,7 @@ TEST_F(NoHeaderTest, AHeaderThatIsTooOldStandsForNothing) {
   EXPECT_EQ(queued.state, BridgeExportState::kFailed);
 }
 
-TEST_F(NoHeaderTest, AStudyThatIsGoneIsToldAndNothingIsStored) {
+TEST_F(NoHeaderTest, MissingStudyIsReportedAndNothingIsStored) {
   pacs_->headers.clear();
   EXPECT_THAT(Work("exports/1"),
               StatusIs(absl::StatusCode::kFailedPrecondition,
@@ -356,7 +356,7 @@ TEST_F(ExportWorkTest, AFullDiskIsWaitedFor) {
     EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kFetched);
   }
   EXPECT_THAT(Work("exports/1"), IsOk());
-  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kTold);
+  EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kReported);
   EXPECT_EQ(Stored().size(), 4);
 }
 

@@ -193,7 +193,7 @@ class SeriesInTwoPartsTest : public SeriesIntakeTest {
   CtSeries series_;
 };
 
-TEST_F(SeriesInTwoPartsTest, WhatWasPassedOverForItsFirstPartIsChosenWhenTheRestCame) {
+TEST_F(SeriesInTwoPartsTest, SeriesPassedOverForItsFirstPartIsChosenOnceTheRestArrives) {
   ReceiveFirst(5);
   EXPECT_EQ(StateOf(series_), SeriesState::kPassedOver) << "the rule wants 8 slices";
   ReceiveRest();
@@ -273,7 +273,7 @@ TEST_F(SeriesInTwoPartsTest, AnotherRecipeLeavesNothingOfTheEarlierPlan) {
   EXPECT_EQ(rows_.GetByUid(series_.series_uid)->recipe, "other.json");
 }
 
-TEST_F(SeriesIntakeTest, AnImageOfAnotherStudyIsToldAndLeftOut) {
+TEST_F(SeriesIntakeTest, ImageOfAnotherStudyIsReportedAndLeftOut) {
   CtSeriesOptions one;
   one.series_uid = "1.2.840.2";
   const CtSeries series = Receive("a", one);
@@ -300,7 +300,7 @@ TEST_F(SeriesIntakeTest, OfTwoStudiesNothingIsMade) {
   EXPECT_THAT(rows_.GetByUid(series.series_uid)->reason, HasSubstr("name another study"));
 }
 
-TEST_F(SeriesIntakeTest, AChoiceIsToldOnce) {
+TEST_F(SeriesIntakeTest, ChoiceIsReportedOnce) {
   const CtSeries series = Receive("a");
   WaitQuietly();
   ASSERT_OK_AND_ASSIGN(const std::vector<std::string> changed, intake_->Settle());
