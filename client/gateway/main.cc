@@ -64,9 +64,9 @@ ExitCode Serve(const tissueform::GatewayOptions& options) {
   std::fflush(stdout);
   const tissueform::SystemdWatchdog watchdog(
       [&gateway](std::function<void()> answered) { (*gateway)->Ask(std::move(answered)); });
-  tissueform::TellSystemdReady();
+  tissueform::NotifySystemdReady();
   ServeUntilSignal(**gateway);
-  tissueform::TellSystemdStopping();
+  tissueform::NotifySystemdStopping();
   (*gateway)->Drain();
   spdlog::info("done; counts: {}", (*gateway)->counters().Text());
   return kExitDone;

@@ -123,9 +123,9 @@ absl::Status Serve(const BridgeOptions& options, BridgeRunKind kind) {
     LogLine(true, absl::StrCat("a step takes too long: ", absl::StrJoin(stuck, ", "),
                                "; systemd restarts the bridge"));
   });
-  TellSystemdReady();
+  NotifySystemdReady();
   WaitForEnd();
-  TellSystemdStopping();
+  NotifySystemdStopping();
   parts->Cancel();
   receiver->Stop();
   return absl::OkStatus();

@@ -71,9 +71,9 @@ ExitCode Serve(const tissueform::ServerOptions& options) {
   std::fflush(stdout);
   const tissueform::SystemdWatchdog watchdog(
       [&server](std::function<void()> answered) { (*server)->Ask(std::move(answered)); });
-  tissueform::TellSystemdReady();
+  tissueform::NotifySystemdReady();
   WaitForTerminationSignal();
-  tissueform::TellSystemdStopping();
+  tissueform::NotifySystemdStopping();
   (*server)->Drain();
   spdlog::info("done");
   return kExitDone;

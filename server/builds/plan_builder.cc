@@ -110,7 +110,7 @@ bool CanDraw() {
 absl::StatusOr<PlanBuildAnswer> Build(const PlanBuildJob& job, const Inputs& inputs,
                                       const PlanBuildLimits& limits, const std::string& folder) {
   PlanBuildCallOptions calling;
-  calling.tell = job.on_stage;
+  calling.on_progress = job.on_stage;
   calling.cancel = job.cancel;
   return CallPlanBuild({.ct = inputs.ct,
                         .recipe = inputs.recipe,

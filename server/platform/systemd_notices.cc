@@ -17,8 +17,8 @@ constexpr int kQuestionsInThatTime = 4;
 
 }  // namespace
 
-void TellSystemdReady() { sd_notify(0, "READY=1"); }
-void TellSystemdStopping() { sd_notify(0, "STOPPING=1"); }
+void NotifySystemdReady() { sd_notify(0, "READY=1"); }
+void NotifySystemdStopping() { sd_notify(0, "STOPPING=1"); }
 
 SystemdWatchdog::SystemdWatchdog(Ask ask) : ask_(std::move(ask)) {
   uint64_t microseconds = 0;

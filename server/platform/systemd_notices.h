@@ -15,8 +15,8 @@ namespace tissueform {
 // Messages that a service of Type=notify sends to systemd (sd_notify(3)). They have no effect in a
 // program that systemd has not started in this way.
 
-void TellSystemdReady();
-void TellSystemdStopping();
+void NotifySystemdReady();
+void NotifySystemdStopping();
 
 // Notifies systemd that the program lives, as often as its unit's WatchdogSec asks, and no longer
 // than the program itself says so: systemd ends a program that is silent, and starts it again.

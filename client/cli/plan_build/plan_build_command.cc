@@ -76,18 +76,19 @@ absl::StatusOr<PlanBuildAnswer> BuildIntoFolder(const PlanBuildArguments& argume
                                                 const EndingSignals& signals) {
   TF_ASSIGN_OR_RETURN(AtomicFolder folder, AtomicFolder::Create(arguments.inputs.out));
   StageTimes times;
-  TF_ASSIGN_OR_RETURN(PlanBuildAnswer made,
-                      CallPlanBuild({.ct = arguments.inputs.ct,
-                                     .recipe = arguments.inputs.recipe,
-                                     .surfaces = arguments.inputs.surfaces,
-                                     .labels = arguments.inputs.labels,
-                                     .folder = folder.path(),
-                                     .folder_name = arguments.inputs.out,
-                                     .threads = arguments.threads,
-                                     .pictures = !arguments.no_pictures},
-                                    {.tell = [&times](absl::string_view stage,
-                                                      double done) { times.Begin(stage, done); },
-                                     .cancel = signals.descriptor()}));
+  TF_ASSIGN_OR_RETURN(
+      PlanBuildAnswer made,
+      CallPlanBuild({.ct = arguments.inputs.ct,
+                     .recipe = arguments.inputs.recipe,
+                     .surfaces = arguments.inputs.surfaces,
+                     .labels = arguments.inputs.labels,
+                     .folder = folder.path(),
+                     .folder_name = arguments.inputs.out,
+                     .threads = arguments.threads,
+                     .pictures = !arguments.no_pictures},
+                    {.on_progress = [&times](absl::string_view stage,
+                                             double done) { times.Begin(stage, done); },
+                     .cancel = signals.descriptor()}));
   times.End();
   if (!arguments.stats.empty()) {
     TF_RETURN_IF_ERROR(WriteStatsFile(arguments.stats, times, arguments.threads));

@@ -96,7 +96,7 @@ absl::StatusOr<PlanBuildAnswer> CallComparison(const PlanCheckOptions& options, 
                         .folder = work.path(),
                         .folder_name = {},
                         .threads = AvailableProcessors()},
-                       {.tell = nullptr, .cancel = cancel});
+                       {.on_progress = nullptr, .cancel = cancel});
 }
 
 // The Dice coefficients of a label map and of our own segmentation.

@@ -92,18 +92,18 @@ class ServerBuild {
       return absl::UnavailableError(
           absl::StrCat("cannot create a folder beside ", inputs_.out, ": ", error.message()));
     }
-    TF_ASSIGN_OR_RETURN(
-        const PlanBuildAnswer answer,
-        CallPlanBuild({.ct = inputs_.ct,
-                       .recipe = inputs_.recipe,
-                       .surfaces = inputs_.surfaces,
-                       .labels = inputs_.labels,
-                       .only_write_inputs = true,
-                       .folder = (folder / kInputsFolder).string(),
-                       .folder_name = inputs_.out,
-                       .threads = AvailableProcessors()},
-                      {.tell = [this](absl::string_view stage, double) { times_.Begin(stage, 0); },
-                       .cancel = signals_.descriptor()}));
+    TF_ASSIGN_OR_RETURN(const PlanBuildAnswer answer,
+                        CallPlanBuild({.ct = inputs_.ct,
+                                       .recipe = inputs_.recipe,
+                                       .surfaces = inputs_.surfaces,
+                                       .labels = inputs_.labels,
+                                       .only_write_inputs = true,
+                                       .folder = (folder / kInputsFolder).string(),
+                                       .folder_name = inputs_.out,
+                                       .threads = AvailableProcessors()},
+                                      {.on_progress = [this](absl::string_view stage,
+                                                             double) { times_.Begin(stage, 0); },
+                                       .cancel = signals_.descriptor()}));
     return answer.text;
   }
 

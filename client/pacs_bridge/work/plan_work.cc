@@ -173,7 +173,7 @@ absl::StatusOr<PlanBuildAnswer> PlanWork::CallOn(const QueuedSeries& series,
                     .max_file_bytes = int64_t{4} << 30};
   PlanBuildCallOptions calling;
   if (options_.on_progress) {
-    calling.tell = [&](absl::string_view stage, double fraction) {
+    calling.on_progress = [&](absl::string_view stage, double fraction) {
       options_.on_progress(series.key, stage, fraction);
     };
   }

@@ -75,7 +75,7 @@ absl::StatusOr<PlanBuildAnswer> ReceiveAnswer(int answer, const PlanBuildCallOpt
     if (kind == kOutcome) break;
     TF_ASSIGN_OR_RETURN(const std::string stage, from.Text());
     TF_ASSIGN_OR_RETURN(const int64_t done, from.Number(kFractionUnits));
-    if (options.tell) options.tell(stage, static_cast<double>(done) / kFractionUnits);
+    if (options.on_progress) options.on_progress(stage, static_cast<double>(done) / kFractionUnits);
   }
   TF_RETURN_IF_ERROR(from.Outcome());
   PlanBuildAnswer made;

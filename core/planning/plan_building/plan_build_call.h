@@ -49,7 +49,7 @@ struct BuildInputFiles {
 struct PlanBuildCallOptions {
   // Called with what begins and how much of the whole is done, in [0, 1], rising; on the caller's
   // thread.
-  std::function<void(absl::string_view stage, double fraction)> tell;
+  std::function<void(absl::string_view stage, double fraction)> on_progress;
   // A descriptor (of a pipe, signalfd, eventfd); the call ends when it becomes readable. -1: none.
   int cancel = -1;
 };

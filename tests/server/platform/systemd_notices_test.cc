@@ -51,9 +51,9 @@ class SystemdNoticesTest : public ::testing::Test {
 };
 
 TEST_F(SystemdNoticesTest, ReportsReadinessAndTheEnd) {
-  TellSystemdReady();
+  NotifySystemdReady();
   EXPECT_EQ(NextNotice(), "READY=1");
-  TellSystemdStopping();
+  NotifySystemdStopping();
   EXPECT_EQ(NextNotice(), "STOPPING=1");
 }
 

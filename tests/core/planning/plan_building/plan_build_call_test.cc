@@ -66,7 +66,7 @@ class PlanBuildCallTest : public ::testing::Test {
 
   // The outcome when the worker gets that signal as soon as it says what it does.
   absl::Status OutcomeAfter(int signal) const {
-    return CallPlanBuild(request_, {.tell =
+    return CallPlanBuild(request_, {.on_progress =
                                         [signal](absl::string_view, double) {
                                           for (const pid_t child : Children()) kill(child, signal);
                                         }})
@@ -80,11 +80,12 @@ class PlanBuildCallTest : public ::testing::Test {
 TEST_F(PlanBuildCallTest, FolderIsFilledStagesRiseAndTheTextNamesTheFolderAsAsked) {
   std::vector<std::string> stages;
   double done = 0;
-  const auto made = CallPlanBuild(request_, {.tell = [&](absl::string_view stage, double fraction) {
-                                    stages.emplace_back(stage);
-                                    EXPECT_THAT(fraction, AllOf(Ge(done), Le(1)));
-                                    done = fraction;
-                                  }});
+  const auto made =
+      CallPlanBuild(request_, {.on_progress = [&](absl::string_view stage, double fraction) {
+                      stages.emplace_back(stage);
+                      EXPECT_THAT(fraction, AllOf(Ge(done), Le(1)));
+                      done = fraction;
+                    }});
   ASSERT_THAT(made, IsOk());
   EXPECT_THAT(made->text, AllOf(HasSubstr("shown/plan.json"), HasSubstr("handle  mandible")));
   EXPECT_FALSE(made->ready) << "edges of 8 mm cut off lips and chin";
@@ -99,8 +100,9 @@ TEST_F(PlanBuildCallTest, CancelledCallHasEndedItsWork) {
   std::array<int, 2> cancel{};
   ASSERT_EQ(pipe2(cancel.data(), O_CLOEXEC), 0);
   const auto text = CallPlanBuild(
-      request_, {.tell = [&](absl::string_view, double) { close(std::exchange(cancel[1], -1)); },
-                 .cancel = cancel[0]});
+      request_,
+      {.on_progress = [&](absl::string_view, double) { close(std::exchange(cancel[1], -1)); },
+       .cancel = cancel[0]});
   EXPECT_THAT(text, StatusIs(absl::StatusCode::kCancelled, HasSubstr("stopped")));
   EXPECT_THAT(Children(), IsEmpty());
   close(cancel[0]);
