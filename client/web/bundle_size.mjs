@@ -14,6 +14,7 @@ const KIB = 1024;
 const PARTS = {
   bone_worker: 16 * KIB,
   charlswasm_decode: 64 * KIB,
+  contact_areas: 4 * KIB,
   moving_export: 16 * KIB,
   movement_bands: 4 * KIB,
   new_plan_page: 28 * KIB,

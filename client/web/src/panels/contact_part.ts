@@ -8,13 +8,15 @@ import type { Signal } from "../workbench/signal";
 import type { Touch } from "../workbench/touch";
 import type { Workbench } from "../workbench/workbench";
 import { button, el, select, throttleToFrame } from "./dom";
+import { pagePart } from "./page_part";
 
 const ON = { value: "on", label: "Lips part, tissue slides" } as const;
 const SEALED = { value: "sealed", label: "Lips sealed, tissue slides" } as const;
 const OFF = { value: "off", label: "Tissue sticks, lips are one piece" } as const;
 
 /** What the texts of the models say is true where tissue sticks. */
-const NO_BAND = "Where lips part no model has a 95 % interval, and models other than Linear elastic take seconds.";
+const NO_BAND = "With contact the material’s part of the 95 % interval is not known.";
+const SLOW_MODELS = " Models other than Linear elastic take seconds.";
 
 /** Whether tissue touches or sticks, and how it touches now; nothing for a case that has no contact. */
 export function contactPart(bench: Workbench, choose: (choice: ContactChoice) => Promise<void>): HTMLElement {
@@ -33,10 +35,18 @@ function touchPart(bench: Workbench): HTMLElement[] {
   const status = el("p", { class: "quiet", attributes: { role: "status" } });
   const shows = button("Show contact", () => {
     shows.setAttribute("aria-pressed", String(shows.getAttribute("aria-pressed") !== "true"));
-    void show();
+    void loadAreas()
+      .catch((thrown) => (bench.notice.value = messageOf(thrown)))
+      .then(show);
   }, { attributes: { "aria-pressed": "false" } });
+  let areasMm2: Float64Array | null = null;
+  const loadAreas = async () => {
+    if (areasMm2 !== null) return;
+    const { contactAreas } = await pagePart(() => import("../case/contact_areas"));
+    areasMm2 = await contactAreas(bench.file);
+  };
   const show = async () => {
-    const touch = await bench.touch();
+    const touch = await bench.touch(areasMm2);
     const text = describeTouch(touch) + describeSeal(sealedPairs(bench.file), await bench.sealState());
     if (status.textContent !== text) status.textContent = text;
     const isShown = touch !== null && bench.comparison.value === null && bench.bite.value === null && shows.getAttribute("aria-pressed") === "true";
@@ -44,7 +54,7 @@ function touchPart(bench: Workbench): HTMLElement[] {
   };
   const later = throttleToFrame(() => void show());
   for (const signal of [bench.answer, bench.comparison, bench.bite, bench.localState]) (signal as Signal<unknown>).watch(later);
-  return [el("div", { class: "buttons" }, [shows]), status, el("p", { class: "quiet", text: NO_BAND })];
+  return [el("div", { class: "buttons" }, [shows]), status, el("p", { class: "quiet", text: NO_BAND + (sealedPairs(bench.file) > 0 ? "" : SLOW_MODELS) })];
 }
 
 /** What became of the seal, with a space before; nothing of free lips. */
@@ -58,7 +68,8 @@ export function describeSeal(pairs: number, state: { partedMm: number; released:
 /** How tissue touches, in a sentence or two. */
 export function describeTouch(touch: Touch | null): string {
   if (touch === null) return "Where tissue presses is known once this page answers by itself.";
-  const { pressingCount, rowCount, mostN, lipsApartMm } = touch;
-  const force = pressingCount === 0 ? "" : `, with ${formatNumber(mostN, 3)} N at most at one (bright points: strong)`;
+  const { pressingCount, rowCount, mostN, mostKpa, lipsApartMm } = touch;
+  const pressure = mostKpa === null ? "" : ` and ${formatNumber(mostKpa)} kPa`;
+  const force = pressingCount === 0 ? "" : `, with at most ${formatNumber(mostN, 3)} N${pressure} at one (bright points: strong)`;
   return `Tissue presses at ${pressingCount} of ${rowCount} places${force}. Lips up to ${formatNumber(lipsApartMm)} mm apart.`;
 }

@@ -10,9 +10,11 @@ export interface Touch {
   rowCount: number;
   pressingCount: number;
   mostN: number;
+  /** Of what presses, by force and area; null without areas. */
+  mostKpa: number | null;
   /** Between the two lips at most, along the normal of the seam: lips that slide on each other are not apart. */
   lipsApartMm: number;
-  /** Where it presses, LPS, mm, and of each the color of its force. */
+  /** Where it presses, LPS, mm, and of each the color of its pressure, or of its force without areas. */
   points: Vector[];
   colors: Float32Array;
 }
@@ -47,26 +49,30 @@ export class TouchReader {
     return this.rows.length === 0;
   }
 
-  /** `displacements`: of CaseFile.followed. `forcesN`: of the rows that may lift off. Null where these are of other rows. */
-  read(displacements: Float32Array, forcesN: Float32Array): Touch | null {
+  /** `displacements`: of CaseFile.followed. `forcesN`, `areasMm2`: of the rows that may lift off. Null where these are of other rows. */
+  read(displacements: Float32Array, forcesN: Float32Array, areasMm2: Float64Array | null = null): Touch | null {
     if (forcesN.length !== this.rows.length) return null;
     const at = (place: number, axis: number) => this.rest[3 * place + axis] + displacements[3 * place + axis];
     const pressing = this.rows.map((_, row) => row).filter((row) => forcesN[row] > 0);
+    // 1 N/mm2 is 1,000 kPa. What presses nowhere has no pressure.
+    const strengths = areasMm2 === null ? forcesN : forcesN.map((force, row) => (areasMm2[row] > 0 ? (1000 * force) / areasMm2[row] : 0));
+    const most = Math.max(0, ...strengths);
     const mostN = pressing.reduce((most, row) => Math.max(most, forcesN[row]), 0);
     const apart = ({ place, other, normal }: Row) => (other === null ? 0 : [0, 1, 2].reduce((sum, axis) => sum + normal[axis] * (at(place, axis) - at(other, axis)), 0));
     return {
       rowCount: this.rows.length,
       pressingCount: pressing.length,
       mostN,
+      mostKpa: areasMm2 === null ? null : most,
       lipsApartMm: this.rows.reduce((most, row) => Math.max(most, apart(row)), 0),
       points: pressing.map((row) => [0, 1, 2].map((axis) => at(this.rows[row].place, axis)) as Vector),
-      colors: forceColors(pressing.map((row) => forcesN[row] / mostN)),
+      colors: strengthColors(pressing.map((row) => strengths[row] / (most || 1))),
     };
   }
 }
 
 /** Dark to bright: weak to strong. */
-function forceColors(shares: readonly number[]): Float32Array {
+function strengthColors(shares: readonly number[]): Float32Array {
   const table = colorTable(VIRIDIS);
   return Float32Array.from(shares.flatMap((share) => [0, 1, 2].map((channel) => table[3 * Math.round(255 * share) + channel] / 255)));
 }

@@ -270,11 +270,11 @@ export class Workbench implements ShownFace {
     this.view.stage.invalidate();
   }
 
-  /** How tissue touches in the plan's newest answer; null where this page does not know. */
-  async touch(): Promise<Touch | null> {
+  /** How tissue touches in the plan's newest answer; null where this page does not know. `areasMm2`: see contactAreas, for pressures. */
+  async touch(areasMm2: Float64Array | null = null): Promise<Touch | null> {
     if (this.touchReader.isEmpty) return null;
     const forcesN = await this.local.contactAt(this.jaw.apply(this.plan.poses()));
-    return forcesN === null ? null : this.touchReader.read(this.newest.displacements, forcesN);
+    return forcesN === null ? null : this.touchReader.read(this.newest.displacements, forcesN, areasMm2);
   }
 
   /** For measures at rest. */

@@ -38,6 +38,19 @@ test("where it presses are points at their moved places, the strongest brightest
   expect(brightness[1]).toBeGreaterThan(brightness[0]);
 });
 
+test("with areas the colors are those of pressures", async () => {
+  const { reader, rest, lips } = await handMade();
+  const forces = new Float32Array(lips.length);
+  forces.set([0.25, 0.5, 0.5]);
+  const areas = new Float64Array(lips.length).fill(100);
+  areas.set([20, 50, 0]);
+  const { mostN, mostKpa, colors } = reader.read(new Float32Array(rest.length), forces, areas) as Touch;
+  expect([mostN, mostKpa]).toEqual([0.5, 12.5]);
+  const brightness = [0, 3, 6].map((at) => colors[at] + colors[at + 1] + colors[at + 2]);
+  expect(brightness[0]).toBeGreaterThan(brightness[1]);
+  expect(brightness[1]).toBeGreaterThan(brightness[2]);
+});
+
 test("forces of other rows say nothing", async () => {
   const { reader, rest } = await handMade();
   expect(reader.read(new Float32Array(rest.length), new Float32Array(3))).toBeNull();
