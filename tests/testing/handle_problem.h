@@ -83,6 +83,19 @@ inline std::vector<HandlePose> RandomPoses(size_t num_handles, double angle, dou
   return poses;
 }
 
+// So many poses of one handle: turned about a point and moved, up to so much along each axis.
+inline std::vector<HandlePose> PosesAbout(const Eigen::Vector3d& pivot_mm, double most_rad,
+                                          double most_mm, size_t count, uint32_t seed) {
+  RandomNumbers random(seed);
+  std::vector<HandlePose> poses(count);
+  for (HandlePose& pose : poses) {
+    pose.rotation_vector = most_rad * random.Vector();
+    pose.pivot_mm = pivot_mm;
+    pose.translation_mm = most_mm * random.Vector();
+  }
+  return poses;
+}
+
 inline std::vector<int32_t> AllVertices(const TetMesh& mesh) {
   return SelectVertices(mesh, [](const Eigen::Vector3d&) { return true; });
 }

@@ -20,6 +20,7 @@
 #include "core/mechanics/deformation/mesh_preparation.h"
 #include "core/mechanics/prepared_answers/create_response.h"
 #include "core/mechanics/prepared_answers/linear_elastic_response.h"
+#include "tests/testing/handle_problem.h"
 #include "tests/testing/meshes.h"
 #include "tests/testing/status_matchers.h"
 
@@ -31,6 +32,7 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using ::tissueform::testing::Bar;
 using ::tissueform::testing::IsOk;
+using ::tissueform::testing::PosesAbout;
 using ::tissueform::testing::StatusIs;
 
 // A bar on its lower end with a handle at its upper one. One wall slides on fixed bone; a second
@@ -77,19 +79,6 @@ class ContactResponseTest : public ::testing::Test {
     std::iota(vertices_.begin(), vertices_.end(), 0);
     response_ =
         *CreateResponse(preparation_, vertices_, {.model = DeformationModel::kLinearElastic});
-    std::mt19937 generator(11);
-    std::uniform_real_distribution<double> number(-1, 1);
-    const auto three = [&](double size) {
-      return Eigen::Vector3d(size * number(generator), size * number(generator),
-                             size * number(generator));
-    };
-    for (int i = 0; i < 50; ++i) {
-      HandlePose pose;
-      pose.rotation_vector = three(0.15);
-      pose.pivot_mm = {2, 2, 8};
-      pose.translation_mm = three(0.8);
-      poses_.push_back(pose);
-    }
   }
 
   FloatPositions Answer(const HandlePose& pose) const {
@@ -101,7 +90,7 @@ class ContactResponseTest : public ::testing::Test {
   const std::shared_ptr<MeshPreparation> preparation_ = PrepareTouchingBar();
   std::vector<int32_t> vertices_;
   std::unique_ptr<VertexResponse> response_;
-  std::vector<HandlePose> poses_;
+  const std::vector<HandlePose> poses_ = PosesAbout({2, 2, 8}, 0.15, 0.8, 50, 11);
 };
 
 TEST_F(ContactResponseTest, IsTheDirectAnswerWithinItsBound) {

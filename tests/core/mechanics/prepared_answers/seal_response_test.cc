@@ -6,7 +6,6 @@
 #include <limits>
 #include <memory>
 #include <numeric>
-#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
 #include "core/mechanics/prepared_answers/create_response.h"
+#include "tests/testing/handle_problem.h"
 #include "tests/testing/parted_block.h"
 #include "tests/testing/status_matchers.h"
 
@@ -31,6 +31,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::tissueform::testing::PartedBlock;
+using ::tissueform::testing::PosesAbout;
 using ::tissueform::testing::StatusIs;
 
 class SealResponseTest : public ::testing::Test {
@@ -55,19 +56,7 @@ class SealResponseTest : public ::testing::Test {
 
   // Of the handle, up to so far and with turns.
   static std::vector<HandlePose> Poses(double most_mm) {
-    std::mt19937 generator(5);
-    std::uniform_real_distribution<double> number(-1, 1);
-    const auto three = [&](double size) {
-      return Eigen::Vector3d(size * number(generator), size * number(generator),
-                             size * number(generator));
-    };
-    std::vector<HandlePose> poses(60);
-    for (HandlePose& pose : poses) {
-      pose.rotation_vector = three(0.1);
-      pose.pivot_mm = {1, 1, 4};
-      pose.translation_mm = three(most_mm);
-    }
-    return poses;
+    return PosesAbout({1, 1, 4}, 0.1, most_mm, 60, 5);
   }
 
   const PartedBlock block_;
