@@ -21,9 +21,12 @@
 namespace tissueform {
 namespace {
 
-// So many released unknowns are about as dear as a new factor without them. (Measured with heads of
-// 25,000 and 36,000 vertices.)
-constexpr Eigen::Index kMaxReleased = 120;
+// So many unknowns that are released at once are about as dear as a new factor without them.
+// (Measured with heads of 25,000 and 36,000 vertices.) Those that were released before cost nothing
+// again but their place in the dense Schur complement, whose factor takes a hundredth of a second
+// at the most.
+constexpr Eigen::Index kMaxReleasedAtOnce = 120;
+constexpr Eigen::Index kMaxReleased = 600;
 
 absl::Status Prepare(const std::vector<int32_t>& prescribed, int unknowns_per_node,
                      absl::FunctionRef<SparseMatrix()> assemble,
@@ -32,7 +35,9 @@ absl::Status Prepare(const std::vector<int32_t>& prescribed, int unknowns_per_no
   if (*system != nullptr) {
     const Eigen::Index ever = (*system)->num_released() + (*system)->num_prescribed();
     const auto kept = static_cast<Eigen::Index>(prescribed.size());
-    if (ever - kept <= kMaxReleased) return (*system)->KeepOnly(prescribed);
+    if ((*system)->num_prescribed() - kept <= kMaxReleasedAtOnce && ever - kept <= kMaxReleased) {
+      return (*system)->KeepOnly(prescribed);
+    }
     node_order = (*system)->node_order();
     system->reset();
   }
