@@ -68,8 +68,8 @@ export function describeSeal(pairs: number, state: { partedMm: number; released:
 /** How tissue touches, in a sentence or two. */
 export function describeTouch(touch: Touch | null): string {
   if (touch === null) return "Where tissue presses is known once this page answers by itself.";
-  const { pressingCount, rowCount, mostN, mostKpa, lipsApartMm } = touch;
-  const pressure = mostKpa === null ? "" : ` and ${formatNumber(mostKpa)} kPa`;
-  const force = pressingCount === 0 ? "" : `, with at most ${formatNumber(mostN, 3)} N${pressure} at one (bright points: strong)`;
+  const { pressingCount, rowCount, mostN, pressureKpa, lipsApartMm } = touch;
+  const pressure = pressureKpa === null ? "" : `; ${formatNumber(pressureKpa.mean)} kPa on average, ${formatNumber(pressureKpa.most)} at most`;
+  const force = pressingCount === 0 ? "" : `, with at most ${formatNumber(mostN, 3)} N at one${pressure} (bright points: strong)`;
   return `Tissue presses at ${pressingCount} of ${rowCount} places${force}. Lips up to ${formatNumber(lipsApartMm)} mm apart.`;
 }
