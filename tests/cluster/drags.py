@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Drags and followers of a cluster, which go on whatever happens to it, and report to a ledger what they saw."""
+"""Drags and followers that go on while parts of their cluster fail, and report what they see to a ledger."""
 
 import contextlib
 import itertools
@@ -69,7 +69,7 @@ class Drag(threading.Thread):
 
     def state(self):
         stream = self.stream
-        description = "none" if stream is None else f"{time.monotonic() - stream.begun_at:.1f} s old, from {stream.node or 'nobody'}, {'' if stream.started else 'not '}started"
+        description = "none" if stream is None else f"{time.monotonic() - stream.begun_at:.1f} s old, from {stream.node or 'no server'}, {'' if stream.started else 'not '}started"
         return f"stream {self.streams}: {description}; sent to {self.route.node or 'any server'}"
 
     def _one_stream(self):

@@ -70,6 +70,12 @@ std::string ReadGolden(const std::string& name, const char* suffix) {
   return BytesOfFile(GoldenPath(name, suffix));
 }
 
+absl::StatusOr<AnswerEvaluator> GoldenEvaluator(const std::string& name) {
+  AnswerReading reading = ReadAnswers(ReadGolden(name, ".bin"));
+  if (reading.error != AnswerError::kNone) return absl::InvalidArgumentError(reading.message);
+  return AnswerEvaluator(std::move(reading.answers));
+}
+
 // Where TISSUEFORM_GOLDEN_ANSWERS says, if it says so.
 void WriteGolden(const std::string& name, const PortableAnswers& answers, const Json& file) {
   const char* folder = std::getenv("TISSUEFORM_GOLDEN_ANSWERS");
@@ -220,9 +226,7 @@ class GoldenSealTest : public ::testing::Test {
 TEST_F(GoldenSealTest, IsWhatIsMadeToday) {
   const Json file = {{"answers", "linear_elastic_seal.bin"}, {"cases", MakeCases()}};
   WriteGolden("linear_elastic_seal", response_->Describe(), file);
-  AnswerReading reading = ReadAnswers(ReadGolden("linear_elastic_seal", ".bin"));
-  ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
-  const AnswerEvaluator kept(std::move(reading.answers));
+  ASSERT_OK_AND_ASSIGN(const AnswerEvaluator kept, GoldenEvaluator("linear_elastic_seal"));
   const Json golden = Json::parse(ReadGolden("linear_elastic_seal", ".json"));
   for (const Json& cases : {golden["cases"], file["cases"]}) {
     ASSERT_EQ(cases.size(), 8U);
@@ -286,9 +290,7 @@ class GoldenBandTest : public ::testing::Test {
 TEST_F(GoldenBandTest, IsThatOfTheServer) {
   const Json file = {{"answers", "linear_elastic_band.bin"}, {"cases", MakeCases()}};
   WriteGolden("linear_elastic_band", answers_, file);
-  AnswerReading reading = ReadAnswers(ReadGolden("linear_elastic_band", ".bin"));
-  ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
-  const AnswerEvaluator kept(std::move(reading.answers));
+  ASSERT_OK_AND_ASSIGN(const AnswerEvaluator kept, GoldenEvaluator("linear_elastic_band"));
   const Json golden = Json::parse(ReadGolden("linear_elastic_band", ".json"));
   for (const Json& cases : {golden["cases"], file["cases"]}) {
     ASSERT_EQ(cases.size(), 8U);
