@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "spdlog/spdlog.h"
 
+#include "client/gateway/page_config.h"
 #include "core/base/software_version.h"
 #include "core/base/status_macros.h"
 #include "server/platform/network_address.h"
@@ -47,7 +48,9 @@ absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& op
   if (!options.web.empty()) {
     TF_ASSIGN_OR_RETURN(files, WebFiles::Load(options.web));
   }
-  auto gateway = absl::WrapUnique(new Gateway(options, std::move(files), std::move(tls_files)));
+  TF_ASSIGN_OR_RETURN(std::string page_config, PageConfigJson(options.login, options.deviations));
+  auto gateway = absl::WrapUnique(
+      new Gateway(options, std::move(files), std::move(page_config), std::move(tls_files)));
   TF_ASSIGN_OR_RETURN(gateway->http_, HttpServer::Start({.host = options.host,
                                                          .port = options.port,
                                                          .threads = options.threads,
@@ -57,14 +60,14 @@ absl::StatusOr<std::unique_ptr<Gateway>> Gateway::Start(const GatewayOptions& op
   return gateway;
 }
 
-Gateway::Gateway(const GatewayOptions& options, WebFiles files,
+Gateway::Gateway(const GatewayOptions& options, WebFiles files, std::string page_config,
                  std::unique_ptr<RotatedFiles> tls_files)
     : options_(options),
       tls_files_(std::move(tls_files)),
       pool_(options.server, options.limits, MakeChannelCredentials(tls_files_.get())),
       routes_(AccessRules(options.host, options.allowed_hosts, options.allowed_origins),
-              ForwardedAddresses(options.trusted_proxies), std::move(files), options.login, &pool_,
-              &counters_) {}
+              ForwardedAddresses(options.trusted_proxies), std::move(files), options.login,
+              std::move(page_config), &pool_, &counters_) {}
 
 absl::Status Gateway::ServeMetrics() {
   if (options_.metrics_port < 0) return absl::OkStatus();

@@ -45,7 +45,8 @@ class Gateway {
   void Drain() { http_->Drain(); }
 
  private:
-  Gateway(const GatewayOptions& options, WebFiles files, std::unique_ptr<RotatedFiles> tls_files);
+  Gateway(const GatewayOptions& options, WebFiles files, std::string page_config,
+          std::unique_ptr<RotatedFiles> tls_files);
 
   absl::Status ServeMetrics();
 

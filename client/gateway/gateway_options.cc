@@ -182,6 +182,10 @@ void AddGatewayOptions(CLI::App& app, GatewayOptions* options) {
   AddUpstreamOptions(app, options);
   app.add_option("--web", options->web, "folder of the built planner (default: none)")
       ->type_name("DIR");
+  app.add_option("--deviations", options->deviations,
+                 "JSON file of what surgery and model err by, for the planner's 95 % intervals "
+                 "(default: published figures; docs/accuracy.md, \"The whole band\")")
+      ->type_name("FILE");
   app.add_option("--allow-host", options->allowed_hosts,
                  "host name of the gateway in browsers, in addition to its own address "
                  "and loopback")

@@ -32,6 +32,7 @@ struct GatewayOptions {
   int threads = 2;
   GatewayLimits limits;
   LoginConfig login = {};
+  std::string deviations = {};  // file of what surgery and model err by; empty: as published
   std::string log_level = "info";
   std::string log_format = "text";
   int metrics_port = -1;  // of loopback; 0: any free one; -1: no metrics

@@ -70,12 +70,12 @@ bool OffersSubprotocol(const HttpHead& head) {
 }  // namespace
 
 GatewayRoutes::GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
-                             const LoginConfig& login, UpstreamPool* pool,
+                             const LoginConfig& login, std::string page_config, UpstreamPool* pool,
                              GatewayCounters* counters)
     : rules_(std::move(rules)),
       addresses_(std::move(addresses)),
       files_(std::move(files)),
-      login_json_(std::make_shared<const std::string>(LoginConfigJson(login))),
+      page_config_(std::make_shared<const std::string>(std::move(page_config))),
       security_policy_(SecurityPolicy(login)),
       pool_(pool),
       counters_(counters) {}
@@ -141,7 +141,7 @@ HttpDecision GatewayRoutes::DecideCall(const HttpHead& head) {
 
 HttpDecision GatewayRoutes::DecideConfig(const HttpHead& head) {
   if (!IsReading(head)) return Refuse(GatewayEvent::kWrongMethod, 405);
-  HttpReply reply = {.fields = CommonFields(), .body = login_json_};
+  HttpReply reply = {.fields = CommonFields(), .body = page_config_};
   reply.fields.emplace_back("content-type", "application/json");
   reply.fields.emplace_back("cache-control", "no-store");
   return {.kind = HttpDecision::kReply, .reply = std::move(reply)};

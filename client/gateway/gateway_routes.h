@@ -21,9 +21,10 @@ namespace tissueform {
 // What is done with each request (docs/gateway.md): who may ask, which path is what.
 class GatewayRoutes final : public HttpHandler {
  public:
-  // `pool` and `counters` must outlive it.
+  // `page_config` is what /config.json answers. `pool` and `counters` must outlive it.
   GatewayRoutes(AccessRules rules, ForwardedAddresses addresses, WebFiles files,
-                const LoginConfig& login, UpstreamPool* pool, GatewayCounters* counters);
+                const LoginConfig& login, std::string page_config, UpstreamPool* pool,
+                GatewayCounters* counters);
 
   HttpDecision Decide(const HttpHead& head) override;
   std::shared_ptr<ReplySource> Stream(const HttpHead& head, std::string body,
@@ -49,7 +50,7 @@ class GatewayRoutes final : public HttpHandler {
   const AccessRules rules_;
   const ForwardedAddresses addresses_;
   const WebFiles files_;
-  const std::shared_ptr<const std::string> login_json_;
+  const std::shared_ptr<const std::string> page_config_;
   const std::string security_policy_;
 
   // Self-synchronised.

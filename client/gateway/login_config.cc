@@ -11,7 +11,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
-#include "nlohmann/json.hpp"
 
 namespace tissueform {
 namespace {
@@ -69,17 +68,6 @@ absl::Status CheckLoginConfig(const LoginConfig& config) {
 
 std::string OriginOfIssuer(const LoginConfig& config) {
   return std::string(HttpOrigin(config.issuer));
-}
-
-std::string LoginConfigJson(const LoginConfig& config) {
-  nlohmann::json json = nlohmann::json::object();
-  if (!config.issuer.empty()) {
-    json["oidc"] = {{"issuer", config.issuer},
-                    {"client_id", config.client_id},
-                    {"audience", config.audience},
-                    {"scope", config.scopes}};
-  }
-  return absl::StrCat(json.dump(), "\n");
 }
 
 }  // namespace tissueform

@@ -25,7 +25,4 @@ absl::Status CheckLoginConfig(const LoginConfig& config);
 // "https://login.example.org": of an issuer that has been checked. Empty without an issuer.
 std::string OriginOfIssuer(const LoginConfig& config);
 
-// What /config.json answers: {} without a login, else an object `oidc`.
-std::string LoginConfigJson(const LoginConfig& config);
-
 }  // namespace tissueform

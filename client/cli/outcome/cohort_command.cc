@@ -3,8 +3,10 @@
 
 #include "client/cli/outcome/cohort_command.h"
 
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -14,6 +16,7 @@
 #include "client/cli/outcome/cohort_list.h"
 #include "client/cli/outcome/cohort_results.h"
 #include "client/cli/outcome/cohort_runs.h"
+#include "client/cli/outcome/cohort_tables.h"
 #include "core/base/atomic_file.h"
 #include "core/base/status_macros.h"
 #include "core/planning/model_names.h"
@@ -39,11 +42,27 @@ void PrintSummary(const nlohmann::ordered_json& json, const std::string& out) {
   absl::PrintF("report: %s/cohort.html\n", out);
 }
 
+// deviations-MODEL.json of each model that has enough figures. One of an earlier run is removed.
+absl::Status WriteDeviations(const CohortResults& results, const std::string& out) {
+  for (const std::string& model : KnownModelNames()) {
+    const std::string path = absl::StrCat(out, "/deviations-", model, ".json");
+    const nlohmann::ordered_json json = DeviationFileJson(results, model);
+    if (json.empty()) {
+      std::error_code ignored;
+      std::filesystem::remove(path, ignored);
+    } else {
+      TF_RETURN_IF_ERROR(WriteFileAtomically(path, json.dump(2) + "\n"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status WriteReports(const CohortResults& results, const std::string& out) {
   const nlohmann::ordered_json json = CohortJson(results);
   TF_RETURN_IF_ERROR(WriteFileAtomically(out + "/cohort.json", json.dump(2) + "\n"));
   TF_RETURN_IF_ERROR(WriteCohortCsv(out + "/cohort.csv", results));
   TF_RETURN_IF_ERROR(WriteFileAtomically(out + "/cohort.html", CohortHtml(results, json)));
+  TF_RETURN_IF_ERROR(WriteDeviations(results, out));
   PrintSummary(json, out);
   if (results.refused.empty()) return absl::OkStatus();
   return absl::AbortedError(
@@ -69,7 +88,8 @@ constexpr char kFooter[] =
     "Only `case` and `operation` (letters, digits, - and _) are written: use no patient's name.\n"
     "Each patient is a process of its own; results are in DIR/cases. The same command again\n"
     "continues after an interruption: it repeats only cases that failed, or whose inputs, options\n"
-    "or program changed. DIR gets cohort.html, cohort.json and cohort.csv; see docs/outcome.md.\n"
+    "or program changed. DIR gets cohort.html, cohort.json and cohort.csv, and from 5 patients on\n"
+    "deviations-MODEL.json, which `tissueform deform --deviations` takes; see docs/outcome.md.\n"
     "Research use. Not a medical device.\n\n"
     "Example:\n"
     "  tissueform outcome cohort patients.csv --out cohort --jobs 4 --memory-gib 24\n"

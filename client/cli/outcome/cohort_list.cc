@@ -20,13 +20,13 @@
 #include "absl/strings/strip.h"
 
 #include "core/base/status_macros.h"
+#include "core/planning/outcome/deviations.h"
 
 namespace tissueform {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMaxWord = 64;
 constexpr size_t kMaxLineBytes = 64 * 1024;
 
 struct Column {
@@ -101,12 +101,6 @@ absl::StatusOr<std::vector<const Column*>> ReadHeader(const std::vector<std::str
   return AtLine(line, absl::StrCat("missing columns: ", absl::StrJoin(missing, ", ")));
 }
 
-bool IsWord(const std::string& text) {
-  return !text.empty() && text.size() <= kMaxWord && std::ranges::all_of(text, [](char c) {
-    return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_';
-  });
-}
-
 absl::StatusOr<CohortCase> ReadRow(const std::vector<std::string>& cells, size_t line,
                                    const std::vector<const Column*>& columns,
                                    const fs::path& folder) {
@@ -122,9 +116,9 @@ absl::StatusOr<CohortCase> ReadRow(const std::vector<std::string>& cells, size_t
     row.*columns[c]->field = is_path ? (folder / cells[c]).lexically_normal().string() : cells[c];
   }
   for (const auto& [name, word] : {std::pair("case", &row.id), {"operation", &row.operation}}) {
-    if (IsWord(*word)) continue;
+    if (IsOperationName(*word)) continue;
     return AtLine(line,
-                  absl::StrCat("\"", name, "\" must be 1 to ", kMaxWord,
+                  absl::StrCat("\"", name, "\" must be 1 to ", kLongestOperationName,
                                " letters, digits, - and _; no path and no name of a patient"));
   }
   return row;

@@ -29,4 +29,11 @@ nlohmann::ordered_json CalibrationJson(const CohortResults& results);
 
 inline constexpr size_t kLeastCalibrated = 3;
 
+// What surgery and the model err by in this cohort, for --deviations of `tissueform deform`
+// (docs/deviations.schema.json): of all operations together, and of each with at least
+// kLeastForDeviations figures. Empty where the whole cohort has fewer of the model.
+nlohmann::ordered_json DeviationFileJson(const CohortResults& results, const std::string& model);
+
+inline constexpr size_t kLeastForDeviations = 5;
+
 }  // namespace tissueform

@@ -20,6 +20,7 @@
 #include "core/mechanics/deformation/linear_elastic_deformer.h"
 #include "core/mechanics/linear_solvers/blas_threads.h"
 #include "core/planning/model_names.h"
+#include "core/planning/outcome/deviations.h"
 #include "core/planning/plan_io.h"
 
 namespace tissueform {
@@ -32,6 +33,7 @@ struct DeformOptions {
   std::string model;
   std::string stats;
   std::string deviations;
+  std::string operation;
   int threads = AvailableProcessors();
   int solver_threads = 1;
 };
@@ -43,8 +45,11 @@ absl::Status CheckOutputs(const DeformOptions& options) {
 
 // As published where no file is named.
 absl::StatusOr<Deviations> ChosenDeviations(const DeformOptions& options) {
-  if (options.deviations.empty()) return Deviations();
-  return ReadDeviations(options.deviations);
+  DeviationTable table = PublishedDeviations();
+  if (!options.deviations.empty()) {
+    TF_ASSIGN_OR_RETURN(table, ReadDeviations(options.deviations));
+  }
+  return DeviationsOf(table, options.operation);
 }
 
 absl::StatusOr<Plan> ReadChosenPlan(const DeformOptions& options) {
@@ -146,10 +151,14 @@ void AddDeformCommand(CLI::App& app, CommandWork* work) {
   command->add_option("--stats", options->stats,
                       "also write counts, times and quality to this JSON file");
   command
-      ->add_option("--deviations", options->deviations,
-                   "JSON file of what surgery and model err by, in place of the published figures\n"
-                   "(docs/accuracy.md, \"The whole band\")")
+      ->add_option(
+          "--deviations", options->deviations,
+          "JSON file of what surgery and model err by, in place of the published figures\n"
+          "(docs/accuracy.md, \"The whole band\"); `tissueform outcome cohort` writes one a model")
       ->check(CLI::ExistingFile);
+  command->add_option("--operation", options->operation,
+                      "take the figures of this operation instead of those of all together;\n"
+                      "published is bsso_forward alone");
   command
       ->add_option("--threads", options->threads, "number of threads; does not affect the result")
       ->check(CLI::Range(1, 256))

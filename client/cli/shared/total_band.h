@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,9 +14,9 @@
 #include "core/base/types.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
 #include "core/mechanics/problem/plan_problem.h"
-#include "core/mechanics/uncertainty/surgery_expansion.h"
 #include "core/mechanics/uncertainty/uncertainty_band.h"
 #include "core/mesh/io/tet_mesh_io.h"
+#include "core/planning/outcome/deviations.h"
 
 namespace tissueform {
 
@@ -26,22 +25,6 @@ namespace tissueform {
 // Point arrays: the 95th percentile of the distance, all parts together, and that of surgery alone.
 inline constexpr char kTotalUncertaintyArray[] = "total_uncertainty_p95_mm";
 inline constexpr char kSurgeryUncertaintyArray[] = "surgery_uncertainty_p95_mm";
-
-// Standard deviations.
-struct Deviations {
-  SurgeryDeviation surgery;
-  // By which a predicted place of the skin is off along its normal though bone lies as assumed:
-  // lower and upper lip 1.2 mm of mean absolute deviation, elsewhere a median of 0.60 mm
-  // (docs/accuracy.md, "The whole band").
-  double model_mm = 0.89;
-  std::map<std::string, double> model_of_place_mm = {{"lower_lip", 1.5}, {"upper_lip", 1.5}};
-  std::string source = "published";
-};
-
-// A JSON file: {"surgery": {"translation_mm": [left, back, up], "rotation_deg": [...]},
-// "model_mm": {"default": 0.9, "chin": 1.1}, "source": "our clinic, 40 patients"}; what it leaves
-// out is as published. Errors: InvalidArgument with the file's name for anything else.
-absl::StatusOr<Deviations> ReadDeviations(const std::string& path);
 
 struct TotalBand {
   // The foremost vertex of a place: its movement in mm along itself, the 95 % interval of that

@@ -23,14 +23,16 @@ class GatewayTest : public ::testing::Test {
   GatewayTest() { Restart({}); }
   ~GatewayTest() override { EXPECT_EQ(StatusOf(Ask(port(), "GET /healthz HTTP/1.1")), 200); }
 
-  // A gateway with these limits, and this login, in its place.
-  void Restart(const GatewayLimits& limits, const LoginConfig& login = {}) {
+  // A gateway with these limits, this login and this file of deviations in its place.
+  void Restart(const GatewayLimits& limits, const LoginConfig& login = {},
+               const std::string& deviations = "") {
     gateway_.reset();
     GatewayOptions options;
     options.server = server_.address();
     options.port = 0;
     options.limits = limits;
     options.login = login;
+    options.deviations = deviations;
     auto gateway = Gateway::Start(options);
     ASSERT_TRUE(gateway.ok()) << gateway.status();
     gateway_ = *std::move(gateway);

@@ -3,6 +3,10 @@
 
 #include "client/gateway/login_config.h"
 
+#include <filesystem>
+#include <fstream>
+#include <string>
+
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -79,6 +83,30 @@ TEST_F(LoginGatewayTest, PageReceivesTheProviderAndMayConnectToNoOther) {
   EXPECT_EQ(oidc["client_id"], "planner");
   EXPECT_EQ(oidc["audience"], "tissueform");
   EXPECT_EQ(oidc["scope"], "openid profile");
+}
+
+TEST_F(LoginGatewayTest, PageReceivesAClinicsDeviationsWithNothingLeftOut) {
+  const std::string file = ::testing::TempDir() + "/gateway_deviations.json";
+  const auto write = [&file](const std::string& text) { std::ofstream(file) << text; };
+  write(R"({"source": "ours", "model_mm": {"chin": 0.5}, "operations": {"bsso": {}}})");
+  Restart({}, {}, file);
+  const std::string reply = Ask(port(), "GET /config.json HTTP/1.1");
+  const auto json = nlohmann::json::parse(reply.substr(reply.find("\r\n\r\n")))["deviations"];
+  EXPECT_EQ(json["source"], "ours");
+  EXPECT_EQ(
+      json["model_mm"],
+      nlohmann::json({{"default", 0.89}, {"chin", 0.5}, {"lower_lip", 1.5}, {"upper_lip", 1.5}}));
+  EXPECT_EQ(json["surgery"]["translation_mm"], nlohmann::json({0.82, 1.1, 1.27}));
+  EXPECT_EQ(json["operations"]["bsso"]["model_mm"], json["model_mm"]);
+
+  write(R"({"model_mm": {"chn": 1}})");
+  GatewayOptions options;
+  options.server = server_.address();
+  options.port = 0;
+  options.deviations = file;
+  EXPECT_THAT(Gateway::Start(options),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("unknown place \"chn\"")));
+  std::filesystem::remove(file);
 }
 
 TEST_F(LoginGatewayTest, TheConfigurationIsReadOnly) {

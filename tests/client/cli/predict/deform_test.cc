@@ -469,6 +469,26 @@ TEST_F(DeformTest, TheWholeBandNamesItsPartsAndTakesAClinicsFigures) {
   EXPECT_EQ(exact["surgery_mm"], 0);
   EXPECT_EQ(exact["model_mm"], 0);
   EXPECT_LT(exact["high_mm"].get<double>() - exact["low_mm"].get<double>(), 0.5);
+
+  // One operation's figures; what it leaves out is as of all.
+  Write("own.json", R"({"model_mm": {"nose": 1}, "source": "ours",
+                        "operations": {"bsso": {"model_mm": {"chin": 0}}}})");
+  EXPECT_EQ(SchemaFindings("deviations.schema.json", "own.json",
+                           {"", "surgery", "model_mm", "operations", "bsso"}),
+            "");
+  const std::vector<std::string> bsso = {"--deviations", "own.json", "--operation", "bsso"};
+  EXPECT_EQ(place_of(bsso, "chin")["model_mm"], 0);
+  EXPECT_NEAR(place_of(bsso, "nose")["model_mm"], 1.96, 0.05);
+  EXPECT_EQ(nlohmann::json::parse(Read("a.json"))["uncertainty"]["deviations"]["source"],
+            "ours, bsso");
+  EXPECT_GT(place_of({"--deviations", "own.json"}, "chin")["model_mm"], 0.1);
+  // Published of one operation: 0.9 mm of mean absolute distance.
+  EXPECT_NEAR(place_of({"--operation", "bsso_forward"}, "nose")["model_mm"],
+              1.96 * 0.9 / std::sqrt(2 / std::numbers::pi), 0.05);
+  const ProcessResult unknown =
+      Run({"deform", plan, "--out", "a.vtu", "--deviations", "own.json", "--operation", "lefort"});
+  EXPECT_NE(unknown.exit_code, 0);
+  EXPECT_THAT(unknown.err, HasSubstr("no deviations of the operation \"lefort\"; known are: bsso"));
   ASSERT_OK_AND_ASSIGN(const TetMeshFile result, ReadTetMesh(Path("a.vtu")));
   EXPECT_NE(FindAttribute(result.point_data, "total_uncertainty_p95_mm"), nullptr);
 }
@@ -482,6 +502,9 @@ TEST_F(DeformTest, DeviationsThatAreNoneAreRefusedInOneLine) {
       {R"({"model_mm": {"chin": -1}})", "\"chin\" needs numbers from 0 to 100"},
       {R"({"model_mm": {"chn": 1}})", "unknown place \"chn\" in \"model_mm\"; allowed: default,"},
       {R"({"model": 3})", "key \"model\" is not known"},
+      {R"({"operations": {"le fort": {}}})", "letters, digits, - and _"},
+      {R"({"operations": {"bsso": {"operations": {}}}})", "key \"operations\" is not known"},
+      {R"({"operations": {"bsso": {"model_mm": {"chn": 1}}}})", "unknown place \"chn\""},
       {R"({"source": )", "deviations wrong.json"}};
   for (const auto& [text, message] : wrong) {
     Write("wrong.json", text);
