@@ -105,7 +105,7 @@ function movements(bench: ExportedPlan, bands: NumbersAtRest["movements"]): obje
       name: landmarks[index].name,
       ...movement,
       ...(bandMm === null ? {} : { band_95_mm: bandMm }),
-      ...(total === undefined ? {} : { lowest_total_mm: total.lowest, highest_total_mm: total.highest, interval_of: intervalOf(total) }),
+      ...(total === undefined ? {} : { lowest_total_mm: total.lowest, highest_total_mm: total.highest, interval_of: intervalOf(total), deviations: total.parts?.source }),
     };
   });
 }
@@ -114,7 +114,7 @@ function measures(results: readonly MeasureResult[]): object[] {
   return results.flatMap((result) => {
     if (result.kind !== "value") return [];
     const { definition, before, after, band } = result;
-    const interval = band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest, interval_of: intervalOf(band) };
+    const interval = band === null ? {} : { lowest_after: band.lowest, highest_after: band.highest, interval_of: intervalOf(band), deviations: band.parts?.source };
     return [{ name: definition.name, title: definition.title, unit: definition.unit, before, after, ...interval }];
   });
 }

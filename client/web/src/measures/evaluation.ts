@@ -14,6 +14,8 @@ export interface Band {
 
 /** Half the interval that each alone would cause. */
 export interface BandParts {
+  /** Where the deviations of surgery and model are from: "published". */
+  source: string;
   surgery: number;
   model: number;
   /** Null where it is not known. */

@@ -8,7 +8,7 @@ import type { LandmarkEntry } from "../case/manifest";
 import type { Anchor } from "./anchor";
 import type { Band, BandParts } from "./evaluation";
 import { type ShownFace, landmarkMovements } from "./face_measures";
-import { LIPS, type Place, type PlanAnswers, bandAround, doubtOf, placeOf } from "./whole_band";
+import { type Place, type PlanAnswers, bandAround, doubtOf, placeOf } from "./whole_band";
 
 const WAYS = ["forwardMm", "leftMm", "upMm", "totalMm"] as const;
 type Way = (typeof WAYS)[number];
@@ -62,7 +62,7 @@ function skinOf(surfaces: ShownFace["file"]["surfaces"]): number {
 function placeOfLandmark(face: ShownFace, landmark: LandmarkEntry): Place {
   const skin = skinOf(face.file.surfaces);
   const anchor = isOnSkin(landmark) && skin >= 0 ? anchorAt(face, skin, landmark.skinVertex as number) : null;
-  if (anchor !== null) return placeOf(face, anchor, LIPS.has(landmark.name));
+  if (anchor !== null) return placeOf(face, anchor, landmark.name);
   const under = (poses: ReadonlyMap<string, Pose>): Vector => {
     const pose = poses.get(landmark.handle);
     return pose === undefined ? landmark.positionMm : movedPoint(pose, landmark.positionMm);

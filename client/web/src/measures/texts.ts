@@ -32,8 +32,9 @@ export function plusMinus(band: Band | null): string {
 
 /** What whole bands say, below `where`. */
 export function wholeBandText(where: string, bands: Iterable<Band>): string {
-  const hasMaterial = Array.from(bands).some(({ parts }) => parts !== undefined && parts.material !== null);
-  return `Below ${where}: where 95 of 100 patients will be if surgery and model err as published${hasMaterial ? ", and the material as the case states" : ""}.`;
+  const parts = Array.from(bands).flatMap((band) => band.parts ?? []);
+  const hasMaterial = parts.some(({ material }) => material !== null);
+  return `Below ${where}: where 95 of 100 patients will be if surgery and model err as ${parts[0]?.source ?? "published"}${hasMaterial ? ", and the material as the case states" : ""}.`;
 }
 
 /** Of a length, which is at least 0: "5.4 to 6.5". */

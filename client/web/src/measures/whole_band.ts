@@ -5,21 +5,10 @@ import type { CaseFile } from "../case/case_file";
 import { type Pose, movedPoint } from "../geometry/pose";
 import { type Vector, add, apply, cross, fromRotationVector, multiply, norm, scaled, subtract, toRotationVector } from "../geometry/rotation";
 import { pointAt } from "../geometry/rigid_fit";
+import { type Deviations, deviationsInUse, modelDeviation } from "./deviations";
 import { type Anchor, anchorPoint, corners } from "./anchor";
 import type { Band, BandParts, MeasureResult } from "./evaluation";
 import { type ShownFace, measureAt, measureFace, shownPoint } from "./face_measures";
-
-/**
- * Standard deviations, as core/mechanics/uncertainty/surgery_expansion.h and client/cli/shared/total_band.h have them (a test
- * compares): by how much surgery misses the plan of a segment along and about the patient's left, back and top, and by how much a
- * predicted place of the skin is off along its normal though bone lies as planned. Sources: docs/accuracy.md, "The whole band".
- */
-export const DEVIATIONS = {
-  translationMm: [0.82, 1.1, 1.27],
-  rotationDeg: [1.17, 1.17, 1.17],
-  modelMm: 0.89,
-  lipsMm: 1.5,
-} as const;
 
 /** Of the normal distribution: 95 of 100 cases are within so many standard deviations. */
 const NORMAL_95 = 1.96;
@@ -27,8 +16,6 @@ const NORMAL_95 = 1.96;
 const STEP = 0.1;
 /** The front of a segment is the mean of this part of its vertices, the foremost ones. */
 const FRONT_PART = 10;
-/** Landmarks of the lips. */
-export const LIPS = new Set(["labrale_superius", "stomion_superius", "labrale_inferius", "stomion_inferius"]);
 const RADIANS = Math.PI / 180;
 
 /** What is asked of who knows the plan's answers. */
@@ -43,7 +30,7 @@ export interface PlanAnswers {
 /** A place of the face that numbers are made of. */
 export interface Place {
   /** Bone lies where it is put: the model is in doubt for skin alone. */
-  skin: { isLip: boolean; normal: Vector } | null;
+  skin: { landmark: string; normal: Vector } | null;
   /** As it is shown, LPS. */
   shown: Vector;
   under(skin: (surface: number) => Float32Array, poses: ReadonlyMap<string, Pose>): Vector;
@@ -63,6 +50,7 @@ export async function doubtOf(file: CaseFile, numbers: PlacedNumbers, answers: P
   const planned = answers.poses();
   if (planned.every(isAtRest)) return null;
   const shown = numbers.numbersAt((name) => placeNamed(numbers, name).shown);
+  const deviations = await deviationsInUse();
   const [surgery, model]: Map<string, number>[] = [new Map(), new Map()];
   const addChange = (variances: Map<string, number>, from: ReadonlyMap<string, number>, to: ReadonlyMap<string, number>, perDeviation: number) => {
     for (const [name, after] of to) {
@@ -78,7 +66,7 @@ export async function doubtOf(file: CaseFile, numbers: PlacedNumbers, answers: P
   // What is shown may be the server's full answer: differences are of answers of one kind.
   const asPlanned = await numbersUnder(planned);
   if (asPlanned === null) return null;
-  for (const poses of missedPoses(file, answers.handles, planned)) {
+  for (const poses of missedPoses(file, answers.handles, planned, deviations)) {
     const missedBy = await numbersUnder(poses);
     if (missedBy === null) return null;
     addChange(surgery, asPlanned, missedBy, 1 / STEP);
@@ -87,10 +75,10 @@ export async function doubtOf(file: CaseFile, numbers: PlacedNumbers, answers: P
     if (skin === null) continue;
     const shifted = add(place, scaled(skin.normal, STEP));
     const off = numbers.numbersAt((other) => (other === name ? shifted : placeNamed(numbers, other).shown));
-    addChange(model, shown, off, (skin.isLip ? DEVIATIONS.lipsMm : DEVIATIONS.modelMm) / STEP);
+    addChange(model, shown, off, modelDeviation(deviations, skin.landmark) / STEP);
   }
   const partOf = (variances: Map<string, number>, name: string) => NORMAL_95 * Math.sqrt(variances.get(name) ?? 0);
-  return new Map(Array.from(shown.keys(), (name) => [name, { surgery: partOf(surgery, name), model: partOf(model, name) }]));
+  return new Map(Array.from(shown.keys(), (name) => [name, { source: deviations.source, surgery: partOf(surgery, name), model: partOf(model, name) }]));
 }
 
 function placeNamed({ places }: PlacedNumbers, name: string): Place {
@@ -102,7 +90,7 @@ function placeNamed({ places }: PlacedNumbers, name: string): Place {
  * material is known the interval is without it. Null where the page cannot answer.
  */
 export async function wholeBands(face: ShownFace, answers: PlanAnswers): Promise<Map<string, Band> | null> {
-  const places = new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, placeOf(face, anchor, LIPS.has(name))]));
+  const places = new Map(Array.from(face.landmarks.placed, ([name, anchor]) => [name, placeOf(face, anchor, name)]));
   const numbersAt = (at: (name: string) => Vector) => new Map(measureAt(face, at).flatMap((result): [string, number][] => (result.kind === "value" ? [[result.definition.name, result.after]] : [])));
   // Before the answers come: the face may change.
   const results = measureFace(face);
@@ -133,23 +121,23 @@ function ofMaterial(result: MeasureResult): number | null {
 }
 
 /** An anchor as a place. */
-export function placeOf(face: ShownFace, anchor: Anchor, isLip: boolean): Place {
+export function placeOf(face: ShownFace, anchor: Anchor, landmark: string): Place {
   return {
-    skin: face.file.surfaces[anchor.surface].entry.kind === "skin" ? { isLip, normal: normalAt(face, anchor) } : null,
+    skin: face.file.surfaces[anchor.surface].entry.kind === "skin" ? { landmark, normal: normalAt(face, anchor) } : null,
     shown: shownPoint(face, anchor),
     under: (skin, poses) => placeUnder(face, anchor, skin, poses),
   };
 }
 
 /** Each with one moved segment a part of a standard deviation off its pose, in one of six ways. */
-function* missedPoses(file: CaseFile, handles: PlanAnswers["handles"], planned: readonly Pose[]): Generator<Pose[]> {
+function* missedPoses(file: CaseFile, handles: PlanAnswers["handles"], planned: readonly Pose[], { translationMm, rotationDeg }: Deviations): Generator<Pose[]> {
   for (const [index, { name }] of handles.entries()) {
     if (isAtRest(planned[index])) continue;
     const front = movedPoint(planned[index], frontOf(file, name));
     for (const axis of [0, 1, 2]) {
       const along = [0, 0, 0].map((_, k) => (k === axis ? 1 : 0)) as Vector;
-      const shift = scaled(along, STEP * DEVIATIONS.translationMm[axis]);
-      const turn = scaled(along, STEP * DEVIATIONS.rotationDeg[axis] * RADIANS);
+      const shift = scaled(along, STEP * translationMm[axis]);
+      const turn = scaled(along, STEP * rotationDeg[axis] * RADIANS);
       yield planned.map((pose, other) => (other === index ? missed(pose, front, [0, 0, 0], shift) : pose));
       yield planned.map((pose, other) => (other === index ? missed(pose, front, turn, [0, 0, 0]) : pose));
     }

@@ -48,7 +48,10 @@ export function movementsPanel(bench: Workbench): HTMLElement {
   const show = () => {
     rest.over();
     draw(null);
-    if (bench.showsPlan && landmarks.length > 0) rest.begin(() => movementBandsAtRest(bench, bench.planAnswers), draw);
+    if (bench.showsPlan && landmarks.length > 0) rest.begin(() => movementBandsAtRest(bench, bench.planAnswers), (whole) => {
+      draw(whole);
+      if (whole !== null) void import("./operation_choice").then(({ showOperationChoice }) => showOperationChoice(bench, table));
+    });
   };
   bench.shown.watch(throttleToFrame(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "Total"].map((text) => el("th", { text, attributes: { scope: "col" } }));

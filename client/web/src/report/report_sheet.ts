@@ -77,7 +77,7 @@ export function answerLine(bench: Pick<Workbench, "comparison" | "model" | "mode
 export function intervalLine(results: readonly MeasureResult[], why: string): string {
   const bands = results.flatMap((result) => (result.kind === "value" && result.band !== null ? [result.band] : []));
   const whole = bands.find(({ parts }) => parts !== undefined);
-  if (whole !== undefined) return `95 % interval: ${intervalOf(whole)} together, with published deviations of surgery and model`;
+  if (whole !== undefined) return `95 % interval: ${intervalOf(whole)} together, with deviations of surgery and model: ${whole.parts?.source}`;
   return bands.length > 0 || why === "" ? "95 % interval, material uncertainty only; excludes model and surgical error" : `no 95 % interval: ${why}`;
 }
 

@@ -5,7 +5,8 @@ import { expect, test } from "vitest";
 import type { Pose } from "../../src/geometry/pose";
 import { landmarkMovements } from "../../src/measures/face_measures";
 import { movementBands } from "../../src/measures/movement_bands";
-import { DEVIATIONS, type PlanAnswers, wholeBands } from "../../src/measures/whole_band";
+import { PUBLISHED } from "../../src/measures/deviations";
+import { type PlanAnswers, wholeBands } from "../../src/measures/whole_band";
 import { faceThatFollows } from "../testing/following_face";
 
 const Z95 = 1.96;
@@ -16,8 +17,8 @@ test("bone is missed by what surgery misses, and has neither model nor material 
   const bone = shown.file.manifest.landmarks.findIndex(({ handle }) => handle === "mandible");
   const band = (await movementBands(shown, answers))?.[bone];
   // Without the turn's part it is the deviation along that axis; the turn can only widen it.
-  expect(band?.forwardMm.parts.surgery).toBeGreaterThanOrEqual(Z95 * DEVIATIONS.translationMm[1] - 1e-3);
-  expect(band?.leftMm.parts.surgery).toBeGreaterThanOrEqual(Z95 * DEVIATIONS.translationMm[0] - 1e-3);
+  expect(band?.forwardMm.parts.surgery).toBeGreaterThanOrEqual(Z95 * PUBLISHED.all.translationMm[1] - 1e-3);
+  expect(band?.leftMm.parts.surgery).toBeGreaterThanOrEqual(Z95 * PUBLISHED.all.translationMm[0] - 1e-3);
   expect(band?.forwardMm.parts).toMatchObject({ model: 0, material: null });
 });
 
@@ -41,7 +42,7 @@ test("the skin's parts add as independent ones, and the model's is along the nor
   const half = ({ lowest, highest }: { lowest: number; highest: number }) => (highest - lowest) / 2;
   expect(half(some.forwardMm)).toBeCloseTo(Math.hypot(half(none.forwardMm), 2), 4);
   const model = Math.hypot(...(["forwardMm", "leftMm", "upMm"] as const).map((way) => none[way].parts.model));
-  expect(model).toBeCloseTo(Z95 * DEVIATIONS.modelMm, 3);
+  expect(model).toBeCloseTo(Z95 * (PUBLISHED.all.modelMm.get("default") ?? NaN), 3);
 });
 
 test("skin that follows its bone by a share is missed by that share", async () => {

@@ -7,7 +7,8 @@ import { movedPoint } from "../../src/geometry/pose";
 import { pointAt } from "../../src/geometry/rigid_fit";
 import { type Vector, add, apply, cross, fromRotationVector, norm, scaled, subtract } from "../../src/geometry/rotation";
 import { anchorPoint, corners } from "../../src/measures/anchor";
-import { DEVIATIONS, wholeBands } from "../../src/measures/whole_band";
+import { PUBLISHED, modelDeviation } from "../../src/measures/deviations";
+import { wholeBands } from "../../src/measures/whole_band";
 import { faceThatFollows } from "../testing/following_face";
 
 const ROOT = new URL("../../../../", import.meta.url);
@@ -15,11 +16,15 @@ const numbers = (text: string | undefined) => (text ?? "").split(",").map(Number
 
 test("the deviations are those of the command", () => {
   const surgery = readFileSync(new URL("core/mechanics/uncertainty/surgery_expansion.h", ROOT), "utf8");
-  const model = readFileSync(new URL("client/cli/shared/total_band.h", ROOT), "utf8");
-  expect(numbers(/translation_mm = \{([^}]*)\}/.exec(surgery)?.[1])).toEqual(DEVIATIONS.translationMm);
-  expect(numbers(/rotation_deg = \{([^}]*)\}/.exec(surgery)?.[1])).toEqual(DEVIATIONS.rotationDeg);
-  expect(numbers(/double model_mm = ([0-9.]+);\n/.exec(model)?.[1])).toEqual([DEVIATIONS.modelMm]);
-  expect(/\{\{"lower_lip", ([0-9.]+)\}, \{"upper_lip", ([0-9.]+)\}\}/.exec(model)?.slice(1).map(Number)).toEqual([DEVIATIONS.lipsMm, DEVIATIONS.lipsMm]);
+  const model = readFileSync(new URL("core/planning/outcome/deviations.h", ROOT), "utf8");
+  const forward = readFileSync(new URL("core/planning/outcome/deviations.cc", ROOT), "utf8");
+  const { translationMm, rotationDeg, modelMm } = PUBLISHED.all;
+  expect(numbers(/translation_mm = \{([^}]*)\}/.exec(surgery)?.[1])).toEqual(translationMm);
+  expect(numbers(/rotation_deg = \{([^}]*)\}/.exec(surgery)?.[1])).toEqual(rotationDeg);
+  expect(numbers(/double model_mm = ([0-9.]+);\n/.exec(model)?.[1])).toEqual([modelMm.get("default")]);
+  expect(/\{\{"lower_lip", ([0-9.]+)\}, \{"upper_lip", ([0-9.]+)\}\}/.exec(model)?.slice(1).map(Number)).toEqual([modelMm.get("lower_lip"), modelMm.get("upper_lip")]);
+  expect(modelMm.size).toBe(3);
+  expect(numbers(/kLowerJawForwardMm = ([0-9.]+);\n/.exec(forward)?.[1])).toEqual([PUBLISHED.operations.get("bsso_forward")?.modelMm.get("default")]);
 });
 
 /** A generator that gives the same numbers in every run (mulberry32), and from it the normal distribution. */
@@ -50,11 +55,11 @@ test("surgery and model together are what thousands of simulated operations show
   const skin: number[] = [];
   const bone: number[] = [];
   for (let i = 0; i < 40_000; ++i) {
-    const turn = fromRotationVector(DEVIATIONS.rotationDeg.map((deviation) => (draw() * deviation * Math.PI) / 180) as Vector);
-    const shift = DEVIATIONS.translationMm.map((deviation) => draw() * deviation) as Vector;
+    const turn = fromRotationVector(PUBLISHED.all.rotationDeg.map((deviation) => (draw() * deviation * Math.PI) / 180) as Vector);
+    const shift = PUBLISHED.all.translationMm.map((deviation) => draw() * deviation) as Vector;
     const missed = (point: Vector) => add(add(front, apply(turn, subtract(movedPoint(pose, point), front))), shift);
     const onSkin = add(skinRest, scaled(subtract(missed(skinRest), skinRest), 0.7));
-    skin.push(add(onSkin, scaled(outward, draw() * DEVIATIONS.modelMm))[0]);
+    skin.push(add(onSkin, scaled(outward, draw() * modelDeviation(PUBLISHED.all, "chin_midline")))[0]);
     bone.push(missed(boneRest)[0]);
   }
   const half = (values: number[]) => {
@@ -79,7 +84,7 @@ test("the band of the material makes it wider, as independent parts add", async 
   expect(some).toEqual({ ...none, material: expect.closeTo(2) });
   expect(none?.material).toBeNull();
   // All of the model's part is the landmark's own, along its normal; bone has none.
-  expect(none?.model).toBeLessThanOrEqual(1.96 * DEVIATIONS.modelMm + 1e-6);
+  expect(none?.model).toBeLessThanOrEqual(1.96 * modelDeviation(PUBLISHED.all, "soft_glabella") + 1e-6);
   expect((await wholeBands(without.shown, without.answers))?.get("lower_midline")?.parts?.model).toBe(0);
 });
 

@@ -42,7 +42,7 @@ test("a stored face is described by its own model and answer, independently of t
 
 test("the report says what its intervals hold, or why there are none", () => {
   const result = (band: Band | null): MeasureResult => ({ definition: MEASURES[0], kind: "value", before: 0, after: 1, band });
-  expect(intervalLine([result(null), result({ lowest: 0, highest: 2, parts: { surgery: 1, model: 0.5, material: null } })], "")).toBe("95 % interval: surgery and model together, with published deviations of surgery and model");
+  expect(intervalLine([result(null), result({ lowest: 0, highest: 2, parts: { source: "published", surgery: 1, model: 0.5, material: null } })], "")).toBe("95 % interval: surgery and model together, with deviations of surgery and model: published");
   expect(intervalLine([result({ lowest: 0, highest: 2 })], "")).toBe("95 % interval, material uncertainty only; excludes model and surgical error");
   expect(intervalLine([result(null)], "the model is not elastic")).toBe("no 95 % interval: the model is not elastic");
 });

@@ -50,8 +50,7 @@ class DenseReference {
  public:
   DenseReference(const PartedBlock& block, const MeshPreparation& preparation,
                  const HandlePose& pose)
-      : block_(block),
-        stiffness_(ElasticStiffness(preparation.elements(), preparation.vertex_cells(),
+      : stiffness_(ElasticStiffness(preparation.elements(), preparation.vertex_cells(),
                                     preparation.stiffness(), kPoisson, 1)) {
     const ConstraintSet& constraints = preparation.constraints();
     const Positions& rest = block.mesh.positions();
@@ -124,7 +123,6 @@ class DenseReference {
     double value;
   };
 
-  const PartedBlock& block_;
   const SparseMatrix stiffness_;
   std::vector<Condition> demanded_;
   std::vector<Condition> unilateral_;
