@@ -13,6 +13,7 @@ const KIB = 1024;
 /** Parts that are fetched when they are first used, by their names up to the hash, and how large each may be. */
 const PARTS = {
   bone_worker: 16 * KIB,
+  case_plan: 16 * KIB,
   charlswasm_decode: 64 * KIB,
   contact_areas: 4 * KIB,
   deviations: 2 * KIB,
@@ -25,10 +26,12 @@ const PARTS = {
   operation_choice: KIB,
   photograph_part: 16 * KIB,
   photograph_worker: 120 * KIB,
+  plan_export: 16 * KIB,
   planner_slices: 16 * KIB,
   report_file: 16 * KIB,
   report_sheet: 16 * KIB,
   side_by_side_page: 16 * KIB,
+  skin_points: 2 * KIB,
   slice_views: 16 * KIB,
   sticking_case: 4 * KIB,
   volume_worker: 80 * KIB,

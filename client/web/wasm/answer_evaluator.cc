@@ -24,6 +24,9 @@ struct Instance {
   std::optional<AnswerEvaluator> evaluator;
   std::vector<AnswerPose> poses;
   std::vector<float> positions;
+  std::vector<int32_t> places;
+  std::vector<ChosenVertex> chosen;
+  std::vector<float> chosen_positions;
   std::vector<float> band_mm;
   TouchForces touch;
   double error_mm = 0;
@@ -84,6 +87,25 @@ EXPORT(evaluate) bool Evaluate() {
   return self.evaluator->Answer(self.poses, &self.positions, &self.error_mm);
 }
 EXPORT(error_mm) double ErrorMm() { return tissueform::Self().error_mm; }
+// Where the numbers of `count` vertices are to be written before `choose`.
+EXPORT(places) int32_t* Places(size_t count) {
+  auto& self = tissueform::Self();
+  self.places.resize(count);
+  return self.places.data();
+}
+EXPORT(choose) float* Choose() {
+  auto& self = tissueform::Self();
+  self.chosen = self.evaluator->Choose(self.places);
+  self.chosen_positions.resize(3 * self.chosen.size());
+  return self.chosen_positions.data();
+}
+// Whether the poses are covered; then the positions of the chosen vertices are written where
+// `choose` said.
+EXPORT(evaluate_chosen) bool EvaluateChosen() {
+  auto& self = tissueform::Self();
+  return self.evaluator->AnswerAt(self.poses, self.chosen, self.chosen_positions.data());
+}
+
 EXPORT(positions) const float* Positions() { return tissueform::Self().positions.data(); }
 
 // The number of contact rows that may lift off: of each the force in Pa mm^2 is written.

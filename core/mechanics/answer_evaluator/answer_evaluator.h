@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -50,6 +51,14 @@ class BasicAnswerEvaluator {
   // The same; resized.
   bool Answer(std::span<const AnswerPose> poses, std::vector<float>* positions,
               double* error_mm = nullptr) const;
+
+  // Where vertices of an answer are found, by their numbers in it. REQUIRES: numbers in [0, number
+  // of vertices).
+  std::vector<ChosenVertex> Choose(std::span<const int32_t> vertices) const;
+  // What Answer writes of chosen vertices, 3 numbers each, the same to the bit. Costs the factors
+  // of the poses and little for each vertex.
+  bool AnswerAt(std::span<const AnswerPose> poses, std::span<const ChosenVertex> chosen,
+                float* positions) const requires(!Matrix::kKeepsEntries);
 
   // The same of poses that need not be covered. REQUIRES: legal poses (AreLegal).
   void Evaluate(std::span<const AnswerPose> poses, float* positions) const;

@@ -65,6 +65,43 @@ bool BasicAnswerEvaluator<Matrix>::Answer(std::span<const AnswerPose> poses,
 }
 
 template <typename Matrix>
+std::vector<ChosenVertex> BasicAnswerEvaluator<Matrix>::Choose(
+    std::span<const int32_t> vertices) const {
+  std::vector<ChosenVertex> chosen;
+  chosen.reserve(vertices.size());
+  for (const int32_t vertex : vertices) {
+    const auto place = static_cast<size_t>(vertex);
+    ChosenVertex& found = chosen.emplace_back();
+    found.region = answers_.regions[place];
+    for (size_t before = 0; before < place; ++before) {
+      const int32_t other = answers_.regions[before];
+      const bool is_alike = found.region < 0 ? other == found.region : other >= 0;
+      if (is_alike) ++found.rank;
+    }
+    if (found.region == PortableAnswers::kFree) free_.Find(answers_, sizes_, &found);
+  }
+  return chosen;
+}
+
+template <typename Matrix>
+bool BasicAnswerEvaluator<Matrix>::AnswerAt(std::span<const AnswerPose> poses,
+                                            std::span<const ChosenVertex> chosen,
+                                            float* positions) const
+    requires(!Matrix::kKeepsEntries) {
+  const Product product = CheckedProductOf(poses);
+  if (!AreCovered(answers_, poses, product.error_mm)) return false;
+  for (const ChosenVertex& vertex : chosen) {
+    if (vertex.region == PortableAnswers::kFree) {
+      free_.MoveOne(answers_, sizes_, product.factors, vertex, positions);
+    } else {
+      VertexPlaces::PlaceOne(answers_, poses, vertex.region, vertex.rank, positions);
+    }
+    positions += 3;
+  }
+  return true;
+}
+
+template <typename Matrix>
 void BasicAnswerEvaluator<Matrix>::Evaluate(std::span<const AnswerPose> poses,
                                             float* positions) const {
   Write(poses, ProductOf(poses), positions);

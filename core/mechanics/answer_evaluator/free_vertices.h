@@ -15,6 +15,16 @@
 
 namespace tissueform {
 
+// Where a vertex of an answer is found.
+struct ChosenVertex {
+  int32_t region = 0;  // as of PortableAnswers
+  size_t rank = 0;     // among those of its kind: free, fixed, of any handle
+  // Of a free one.
+  size_t matrix = 0;        // of a cluster, or the only one
+  size_t row = 0;           // the first of its rows
+  size_t first_factor = 0;  // of the matrix, in numbers
+};
+
 // The free vertices as columns move them, of one matrix or, with neo_hookean, of each cluster's own
 // and a map that is one, too. `Matrix` is PackedMatrix or what has its members.
 //
@@ -34,6 +44,13 @@ class FreeVertices {
   void Move(const PortableAnswers& answers, const AnswerSizes& sizes,
             const std::vector<double>& mapped, const ColumnReading& reading,
             float* positions) const;
+
+  // Fills in what a free vertex of that rank has of its own.
+  void Find(const PortableAnswers& answers, const AnswerSizes& sizes, ChosenVertex* vertex) const;
+  // What Move writes of one of them: three numbers.
+  void MoveOne(const PortableAnswers& answers, const AnswerSizes& sizes,
+               const std::vector<double>& mapped, const ChosenVertex& vertex,
+               float* position) const;
 
   // Of every cluster, or the only one.
   const std::vector<Matrix>& columns() const { return columns_; }
@@ -126,6 +143,37 @@ void FreeVertices<Matrix>::MoveClusters(const PortableAnswers& answers,
         positions[at + axis] = answers.free_rest[at + axis] + moves[i + axis];
       }
     }
+  }
+}
+
+template <typename Matrix>
+void FreeVertices<Matrix>::Find(const PortableAnswers& answers, const AnswerSizes& sizes,
+                                ChosenVertex* vertex) const {
+  size_t place = vertex->rank;
+  if (sizes.pairs > 0) {
+    const auto& vertices = answers.cluster_vertices;
+    place = static_cast<size_t>(
+        std::find(vertices.begin(), vertices.end(), static_cast<int32_t>(place)) -
+        vertices.begin());
+    for (; 3 * place >= columns_[vertex->matrix].rows(); ++vertex->matrix) {
+      place -= columns_[vertex->matrix].rows() / 3;
+      vertex->first_factor += columns_[vertex->matrix].columns();
+    }
+  }
+  vertex->row = place * (3 / sizes.factor_width);
+}
+
+template <typename Matrix>
+void FreeVertices<Matrix>::MoveOne(const PortableAnswers& answers, const AnswerSizes& sizes,
+                                   const std::vector<double>& mapped, const ChosenVertex& vertex,
+                                   float* position) const {
+  const size_t width = sizes.factor_width;
+  for (size_t row = 0; width * row < 3; ++row) {
+    columns_[vertex.matrix].MultiplyRow(vertex.row + row, mapped.data() + vertex.first_factor,
+                                        width, position + width * row);
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    position[axis] += answers.free_rest[3 * vertex.rank + axis];
   }
 }
 

@@ -74,4 +74,18 @@ void PackedMatrix::Multiply(const double* factors, size_t width, const ColumnRea
              : MultiplyAll<1>(part_, factors, reading, product);
 }
 
+void PackedMatrix::MultiplyRow(size_t row, const double* factors, size_t width,
+                               float* product) const {
+  const size_t only_upper = part_.columns - part_.full;
+  std::fill_n(product, width, 0.0F);
+  for (size_t c = 0; c < part_.columns; ++c) {
+    double entry = part_.upper[c * part_.rows + row] * double{kUpper};
+    if (c >= only_upper) entry += part_.lower[(c - only_upper) * part_.rows + row];
+    for (size_t f = 0; f < width; ++f) {
+      product[f] +=
+          static_cast<float>(entry) * static_cast<float>(factors[width * c + f] * part_.steps[c]);
+    }
+  }
+}
+
 }  // namespace tissueform

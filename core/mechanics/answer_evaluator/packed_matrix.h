@@ -45,6 +45,9 @@ class PackedMatrix {
   void Multiply(const double* factors, size_t width, const ColumnReading& reading,
                 float* product) const;
 
+  // The same of one row with all digits of all columns: `width` numbers, the same to the bit.
+  void MultiplyRow(size_t row, const double* factors, size_t width, float* product) const;
+
   size_t rows() const { return part_.rows; }
   size_t columns() const { return part_.columns; }
   size_t full_columns() const { return part_.full; }

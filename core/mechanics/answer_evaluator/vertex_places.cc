@@ -98,6 +98,17 @@ void VertexPlaces::Complete(const PortableAnswers& answers, std::span<const Answ
   }
 }
 
+void VertexPlaces::PlaceOne(const PortableAnswers& answers, std::span<const AnswerPose> poses,
+                            int32_t region, size_t rank, float* position) {
+  if (region == PortableAnswers::kFixed) {
+    std::copy_n(answers.fixed_rest.data() + 3 * rank, 3, position);
+    return;
+  }
+  constexpr double kZero[3] = {};
+  PlaceHeld(MotionAbout(poses[static_cast<size_t>(region)], kZero),
+            answers.handle_rest.data() + 3 * rank, position);
+}
+
 double VertexPlaces::ErrorMm(std::span<const AnswerPose> poses) const {
   double largest = largest_fixed_mm_;
   for (size_t h = 0; h < handles_.size(); ++h) {

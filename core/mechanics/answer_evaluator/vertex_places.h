@@ -29,6 +29,10 @@ class VertexPlaces {
   void Complete(const PortableAnswers& answers, std::span<const AnswerPose> poses,
                 float* positions) const;
 
+  // Where a vertex is that is not free, by its rank among the fixed ones or those of handles.
+  static void PlaceOne(const PortableAnswers& answers, std::span<const AnswerPose> poses,
+                       int32_t region, size_t rank, float* position);
+
   // How far, in mm, a vertex that is not free can lie from where it should be: half a unit in the
   // last place of the largest coordinate. REQUIRES: a pose for every handle.
   double ErrorMm(std::span<const AnswerPose> poses) const;

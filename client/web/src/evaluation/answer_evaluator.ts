@@ -23,6 +23,9 @@ export interface EvaluatorExports {
   evaluate(): number;
   error_mm(): number;
   positions(): number;
+  places(count: number): number;
+  choose(): number;
+  evaluate_chosen(): number;
   evaluate_band(): number;
   band_mm(): number;
   evaluate_contact(): number;
@@ -69,6 +72,8 @@ export class AnswerEvaluator {
   private readonly handles: number;
   private readonly bandMm: Float32Array | null;
   private readonly result: Evaluation;
+  /** Those of the last `placesAt`, and where their positions are written. */
+  private chosen: { vertices: Int32Array; address: number } = { vertices: new Int32Array(), address: 0 };
 
   /**
    * `module`: of evaluatorModule, perhaps in another thread. `sha256`: of the bytes, 64 hexadecimal digits; not compared where it is
@@ -124,6 +129,26 @@ export class AnswerEvaluator {
     if (kind === "positions") return this.places();
     if (kind === "seal") return this.seal();
     return kind === "band" ? (this.band()?.slice() ?? null) : this.contactForces();
+  }
+
+  /** Of each set of poses where these vertices are, three numbers each, the same as of `evaluate`; null where one is not covered. Costs little for each set. */
+  placesAt(poseSets: readonly (readonly Pose[])[], vertices: Int32Array): Float32Array | null {
+    const { exports } = this;
+    if (this.chosen.vertices.join() !== vertices.join()) this.chosen = { vertices, address: this.choose(vertices) };
+    const { address } = this.chosen;
+    const size = 3 * vertices.length;
+    const places = new Float32Array(size * poseSets.length);
+    for (const [set, poses] of poseSets.entries()) {
+      if (!this.setPoses(poses) || exports.evaluate_chosen() === 0) return null;
+      places.set(new Float32Array(exports.memory.buffer, address, size), set * size);
+    }
+    return places;
+  }
+
+  private choose(vertices: Int32Array): number {
+    const { exports } = this;
+    new Int32Array(exports.memory.buffer, exports.places(vertices.length), vertices.length).set(vertices);
+    return exports.choose();
   }
 
   private setPoses(poses: readonly Pose[]): boolean {

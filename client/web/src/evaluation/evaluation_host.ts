@@ -28,6 +28,7 @@ export interface EvaluationHost {
   ask(poses: readonly Pose[], number: number): void;
   /** As of AnswerEvaluator; null, too, where the host was closed. Listeners for answers receive nothing. */
   valuesAt(poses: readonly Pose[], kind: ValueKind): Promise<Float32Array | null>;
+  placesAt(poseSets: readonly (readonly Pose[])[], vertices: Int32Array): Promise<Float32Array | null>;
   close(): void;
 }
 
@@ -88,6 +89,10 @@ class PageHost implements EvaluationHost {
     return this.evaluator.valuesAt(poses, kind);
   }
 
+  async placesAt(poseSets: readonly (readonly Pose[])[], vertices: Int32Array): Promise<Float32Array | null> {
+    return this.evaluator.placesAt(poseSets, vertices);
+  }
+
   close(): void {}
 }
 
@@ -115,11 +120,11 @@ class WorkerHost implements EvaluationHost {
   }
 
   valuesAt(poses: readonly Pose[], kind: ValueKind): Promise<Float32Array | null> {
-    return new Promise((done) => {
-      if (this.isClosed) return done(null);
-      this.asking.push(done);
-      this.worker.postMessage({ kind: "values", of: kind, poses: [...poses] });
-    });
+    return this.askValues({ kind: "values", of: kind, poses: [...poses] });
+  }
+
+  placesAt(poseSets: readonly (readonly Pose[])[], vertices: Int32Array): Promise<Float32Array | null> {
+    return this.askValues({ kind: "places", poseSets: poseSets.map((poses) => [...poses]), vertices });
   }
 
   close(): void {
@@ -128,6 +133,14 @@ class WorkerHost implements EvaluationHost {
     this.worker.onerror = null;
     this.worker.terminate();
     this.asking.splice(0).forEach((done) => done(null));
+  }
+
+  private askValues(message: ToWorker): Promise<Float32Array | null> {
+    return new Promise((done) => {
+      if (this.isClosed) return done(null);
+      this.asking.push(done);
+      this.worker.postMessage(message);
+    });
   }
 
   private end(): void {

@@ -6,7 +6,7 @@ import { AnswerEvaluator, type ValueKind } from "./answer_evaluator";
 
 // What page and worker say to each other. A worker is loaded once, and answers one question at a time, in their order.
 
-export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string; module: WebAssembly.Module } | { kind: "evaluate"; poses: Pose[] } | { kind: "values"; of: ValueKind; poses: Pose[] };
+export type ToWorker = { kind: "load"; bytes: Uint8Array; sha256: string; module: WebAssembly.Module } | { kind: "evaluate"; poses: Pose[] } | { kind: "values"; of: ValueKind; poses: Pose[] } | { kind: "places"; poseSets: Pose[][]; vertices: Int32Array };
 
 export type FromWorker =
   | { kind: "ready"; medianMs: number }
@@ -24,6 +24,7 @@ export class EvaluationService {
     try {
       if (message.kind === "load") await this.load(message);
       else if (message.kind === "values") this.post({ kind: "values", values: this.evaluator?.valuesAt(message.poses, message.of) ?? null }, []);
+      else if (message.kind === "places") this.post({ kind: "values", values: this.evaluator?.placesAt(message.poseSets, message.vertices) ?? null }, []);
       else this.evaluate(message.poses);
     } catch (thrown) {
       this.post({ kind: "failed", message: thrown instanceof Error ? thrown.message : String(thrown) }, []);

@@ -106,6 +106,16 @@ export class LocalAnswers {
     return this.host?.valuesAt(poses, "positions") ?? Promise.resolve(null);
   }
 
+  /** Of each set of poses where these vertices are, mm; null likewise. */
+  placesAt(poseSets: readonly (readonly Pose[])[], vertices: Int32Array): Promise<Float32Array | null> {
+    return this.host?.placesAt(poseSets, vertices) ?? Promise.resolve(null);
+  }
+
+  /** Within the picture of the pose; otherwise some pictures later, or not at all. */
+  get answersAtOnce(): boolean {
+    return this.host?.place === "page";
+  }
+
   /** The band of other poses than those of the hand, of every vertex, mm; null where the columns know none. */
   bandAt(poses: readonly Pose[]): Promise<Float32Array | null> {
     return this.host?.valuesAt(poses, "band") ?? Promise.resolve(null);

@@ -3,7 +3,6 @@
 
 import { baseOf } from "../calls/gateway";
 import type { Vector } from "../geometry/rotation";
-import { Signal } from "../workbench/signal";
 
 /** By how much surgery and the model err: standard deviations, as of core/planning/outcome/deviations.h. */
 export interface Deviations {
@@ -90,7 +89,7 @@ function axesOf(json: unknown): Vector {
 }
 
 /** Of which operation the figures are; "": of all together. */
-export const operation = new Signal("");
+export const chosen = { operation: "" };
 
 let known: Promise<DeviationTable> | null = null;
 
@@ -106,7 +105,7 @@ export function deviationTable(): Promise<DeviationTable> {
 /** Of the chosen operation. */
 export async function deviationsInUse(): Promise<Deviations> {
   const { all, operations } = await deviationTable();
-  return operations.get(operation.value) ?? all;
+  return operations.get(chosen.operation) ?? all;
 }
 
 async function fetchTable(): Promise<DeviationTable> {

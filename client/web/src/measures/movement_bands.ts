@@ -67,7 +67,7 @@ function placeOfLandmark(face: ShownFace, landmark: LandmarkEntry): Place {
     const pose = poses.get(landmark.handle);
     return pose === undefined ? landmark.positionMm : movedPoint(pose, landmark.positionMm);
   };
-  return { skin: null, shown: under(face.shownPoses), under: (_, poses) => under(poses) };
+  return { skin: null, shown: under(face.shownPoses), under };
 }
 
 /** A corner of one of the vertex's triangles; null where no triangle has the vertex. */

@@ -23,17 +23,18 @@ export interface PlanAnswers {
   readonly handles: readonly { readonly name: string }[];
   /** Of the plan, one for each handle. */
   poses(): Pose[];
-  /** Where the skin's vertices are under other poses, by surface as of ShownFace; null where that is not known. */
-  skinAt(poses: readonly Pose[]): Promise<((surface: number) => Float32Array) | null>;
+  /** Of each set of poses where points of the skin are, LPS; null where that is not known. */
+  readonly skinPointsAt: (poseSets: readonly (readonly Pose[])[], anchors: readonly Anchor[]) => Promise<Vector[][] | null>;
 }
 
 /** A place of the face that numbers are made of. */
 export interface Place {
   /** Bone lies where it is put: the model is in doubt for skin alone. */
-  skin: { landmark: string; normal: Vector } | null;
+  skin: { landmark: string; anchor: Anchor; normal: Vector } | null;
   /** As it is shown, LPS. */
   shown: Vector;
-  under(skin: (surface: number) => Float32Array, poses: ReadonlyMap<string, Pose>): Vector;
+  /** Of bone, under other poses. */
+  under(poses: ReadonlyMap<string, Pose>): Vector;
 }
 
 /** Numbers by name, of places that go by name. */
@@ -58,19 +59,10 @@ export async function doubtOf(file: CaseFile, numbers: PlacedNumbers, answers: P
       if (before !== undefined) variances.set(name, (variances.get(name) ?? 0) + ((after - before) * perDeviation) ** 2);
     }
   };
-  const numbersUnder = async (poses: readonly Pose[]) => {
-    const skin = await answers.skinAt(poses);
-    const byHandle = new Map(answers.handles.map(({ name }, index) => [name, poses[index]]));
-    return skin === null ? null : numbers.numbersAt((name) => placeNamed(numbers, name).under(skin, byHandle));
-  };
   // What is shown may be the server's full answer: differences are of answers of one kind.
-  const asPlanned = await numbersUnder(planned);
-  if (asPlanned === null) return null;
-  for (const poses of missedPoses(file, answers.handles, planned, deviations)) {
-    const missedBy = await numbersUnder(poses);
-    if (missedBy === null) return null;
-    addChange(surgery, asPlanned, missedBy, 1 / STEP);
-  }
+  const [asPlanned, ...missed] = (await numbersUnder([planned, ...missedPoses(file, answers.handles, planned, deviations)], numbers, answers)) ?? [];
+  if (asPlanned === undefined) return null;
+  for (const missedBy of missed) addChange(surgery, asPlanned, missedBy, 1 / STEP);
   for (const [name, { skin, shown: place }] of numbers.places) {
     if (skin === null) continue;
     const shifted = add(place, scaled(skin.normal, STEP));
@@ -79,6 +71,18 @@ export async function doubtOf(file: CaseFile, numbers: PlacedNumbers, answers: P
   }
   const partOf = (variances: Map<string, number>, name: string) => NORMAL_95 * Math.sqrt(variances.get(name) ?? 0);
   return new Map(Array.from(shown.keys(), (name) => [name, { source: deviations.source, surgery: partOf(surgery, name), model: partOf(model, name) }]));
+}
+
+/** Under each set of poses; null where the page cannot answer. */
+async function numbersUnder(poseSets: readonly (readonly Pose[])[], numbers: PlacedNumbers, { handles, skinPointsAt }: PlanAnswers): Promise<ReadonlyMap<string, number>[] | null> {
+  const onSkin = Array.from(numbers.places).flatMap(([name, { skin }]) => (skin === null ? [] : [{ name, anchor: skin.anchor }]));
+  const points = await skinPointsAt(poseSets, onSkin.map(({ anchor }) => anchor));
+  if (points === null) return null;
+  return poseSets.map((poses, set) => {
+    const byHandle = new Map(handles.map(({ name }, index) => [name, poses[index]]));
+    const skin = new Map(onSkin.map(({ name }, index) => [name, points[set][index]]));
+    return numbers.numbersAt((name) => skin.get(name) ?? placeNamed(numbers, name).under(byHandle));
+  });
 }
 
 function placeNamed({ places }: PlacedNumbers, name: string): Place {
@@ -123,9 +127,9 @@ function ofMaterial(result: MeasureResult): number | null {
 /** An anchor as a place. */
 export function placeOf(face: ShownFace, anchor: Anchor, landmark: string): Place {
   return {
-    skin: face.file.surfaces[anchor.surface].entry.kind === "skin" ? { landmark, normal: normalAt(face, anchor) } : null,
+    skin: face.file.surfaces[anchor.surface].entry.kind === "skin" ? { landmark, anchor, normal: normalAt(face, anchor) } : null,
     shown: shownPoint(face, anchor),
-    under: (skin, poses) => placeUnder(face, anchor, skin, poses),
+    under: (poses) => boneUnder(face, anchor, poses),
   };
 }
 
@@ -170,10 +174,9 @@ function findFront(file: CaseFile, handle: string): Vector {
   return scaled(front.reduce(add, [0, 0, 0]), 1 / Math.max(1, front.length));
 }
 
-function placeUnder(face: ShownFace, anchor: Anchor, skin: (surface: number) => Float32Array, poses: ReadonlyMap<string, Pose>): Vector {
-  const { entry, positions, triangles } = face.file.surfaces[anchor.surface];
-  if (entry.kind === "skin") return anchorPoint({ positions: skin(anchor.surface), triangles }, anchor);
-  const point = anchorPoint({ positions, triangles }, anchor);
+function boneUnder({ file }: ShownFace, anchor: Anchor, poses: ReadonlyMap<string, Pose>): Vector {
+  const { entry, ...shape } = file.surfaces[anchor.surface];
+  const point = anchorPoint(shape, anchor);
   const pose = poses.get(entry.handle);
   return pose === undefined ? point : movedPoint(pose, point);
 }

@@ -3,12 +3,14 @@
 
 import { messageOf } from "../calls/call_error";
 import { download, toPly, toPng, toStl } from "../exports/files";
-import { CASE_FILE, plannedRanges } from "../exports/case_plan";
-import { exportedSurfaces, planDocument, provenanceLines } from "../exports/plan_export";
 import { measureAtRest, movementBandsAtRest } from "../measures/rest_measures";
 import type { Workbench } from "../workbench/workbench";
 import { button, el, section, whileBusy } from "./dom";
 import { movingFilePart } from "./moving_file_part";
+
+/** Fetched when something is saved. */
+const planExport = () => import("../exports/plan_export");
+const casePlan = () => import("../exports/case_plan");
 
 /** What is shown, as files. Names of files hold nothing of the patient. */
 export function exportPanel(bench: Workbench): HTMLElement {
@@ -27,16 +29,22 @@ export function exportPanel(bench: Workbench): HTMLElement {
     const background = getComputedStyle(document.body).backgroundColor;
     download("tissueform.png", await toPng(picture, background, remark()));
   };
+  const stl = async (what: "skin" | "all", name: string) => save(name, "model/stl", toStl((await planExport()).exportedSurfaces(bench, what), remark()));
+  const ply = async () => {
+    const { exportedSurfaces, provenanceLines } = await planExport();
+    save("tissueform-face.ply", "application/octet-stream", toPly(exportedSurfaces(bench, "skin"), provenanceLines(bench)));
+  };
   const plan = async () => {
+    const [{ planDocument }, { plannedRanges }] = await Promise.all([planExport(), casePlan()]);
     const ranges = await plannedRanges(bench.file);
     const atRest = { measures: await measureAtRest(bench, bench.planAnswers), movements: await movementBandsAtRest(bench, bench.planAnswers) };
     save("tissueform-plan.json", "application/json", planDocument(bench, atRest, ranges));
   };
   return section("Export", [
     el("div", { class: "buttons" }, [
-      button("Face STL", reportingErrors(() => save("tissueform-face.stl", "model/stl", toStl(exportedSurfaces(bench, "skin"), remark())))),
-      button("All STL", reportingErrors(() => save("tissueform-all.stl", "model/stl", toStl(exportedSurfaces(bench, "all"), remark())))),
-      button("Face PLY", reportingErrors(() => save("tissueform-face.ply", "application/octet-stream", toPly(exportedSurfaces(bench, "skin"), provenanceLines(bench))))),
+      button("Face STL", reportingErrors(() => stl("skin", "tissueform-face.stl"))),
+      button("All STL", reportingErrors(() => stl("all", "tissueform-all.stl"))),
+      button("Face PLY", reportingErrors(ply)),
       button("Picture", reportingErrors(png)),
       button("Plan JSON", reportingErrors(plan)),
       caseButton(bench),
@@ -49,7 +57,7 @@ export function exportPanel(bench: Workbench): HTMLElement {
 /** The file that an exported plan names as its mesh. */
 function caseButton(bench: Workbench): HTMLElement {
   const { source } = bench.file;
-  const run = async () => download(CASE_FILE, new Blob([await source.read(0, source.totalBytes)], { type: "model/gltf-binary" }));
+  const run = async () => download((await casePlan()).CASE_FILE, new Blob([await source.read(0, source.totalBytes)], { type: "model/gltf-binary" }));
   const control = button("Case file", () => void whileBusy(control, run, (thrown) => (bench.notice.value = messageOf(thrown))));
   return control;
 }

@@ -27,8 +27,9 @@ export function measuresPanel(bench: Workbench): HTMLElement {
   const show = () => {
     rest.over();
     if (!panel.open) return;
-    draw(measureFace(bench));
-    if (bench.showsPlan) rest.begin(() => measureAtRest(bench, bench.planAnswers), draw);
+    const atOnce = bench.answersAtOnce;
+    if (!atOnce || !rest.isQuick) draw(measureFace(bench));
+    if (bench.showsPlan) rest.begin(() => measureAtRest(bench, bench.planAnswers), draw, atOnce);
   };
   const panel: HTMLDetailsElement = collapsible("Measures", [table, landmarks.element, ownMeasuresPart(bench)], (isOpen) => {
     landmarks.show(isOpen);

@@ -31,7 +31,7 @@ export function movementsPanel(bench: Workbench): HTMLElement {
     const row = el("tr", {}, [el("th", { attributes: { scope: "row" } }, [landmark.label, parts]), ...cells]);
     return { row, parts, cells };
   });
-  // `whole`: null while the hand moves, and where they are not known.
+  // `whole`: null where they are not known, and until they are.
   const draw = (whole: readonly (MovementBand | null)[] | null) => {
     const movements = landmarkMovements(bench);
     caption.textContent = [captionOf(headFrame.source), bandCaption(whole, movements.some(({ bandMm }) => bandMm !== null))].filter((text) => text !== "").join(" ");
@@ -47,11 +47,12 @@ export function movementsPanel(bench: Workbench): HTMLElement {
   const rest = new Rest();
   const show = () => {
     rest.over();
-    draw(null);
+    const atOnce = bench.answersAtOnce && landmarks.length > 0;
+    if (!atOnce || !rest.isQuick) draw(null);
     if (bench.showsPlan && landmarks.length > 0) rest.begin(() => movementBandsAtRest(bench, bench.planAnswers), (whole) => {
       draw(whole);
       if (whole !== null) void import("./operation_choice").then(({ showOperationChoice }) => showOperationChoice(bench, table));
-    });
+    }, atOnce);
   };
   bench.shown.watch(throttleToFrame(show));
   const heads = ["Landmark", "Forward", "Left", "Up", "Total"].map((text) => el("th", { text, attributes: { scope: "col" } }));

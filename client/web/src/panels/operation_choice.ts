@@ -1,7 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { deviationTable, operation } from "../measures/deviations";
+import { chosen, deviationTable } from "../measures/deviations";
 import type { Workbench } from "../workbench/workbench";
 import { el } from "./dom";
 
@@ -11,9 +11,9 @@ export async function showOperationChoice(bench: Workbench, table: HTMLElement):
   if (operations.size === 0 || table.nextElementSibling?.classList.contains("operation")) return;
   const select = el("select", {}, [el("option", { text: "all operations", attributes: { value: "" } }), ...Array.from(operations.keys(), (name) => el("option", { text: name, attributes: { value: name } }))]);
   select.addEventListener("change", () => {
-    operation.value = select.value;
+    chosen.operation = select.value;
     bench.shown.value += 1;
   });
-  operation.watch((name) => (select.value = name));
+  select.value = chosen.operation;
   table.after(el("label", { class: "operation" }, ["Intervals of ", select]));
 }

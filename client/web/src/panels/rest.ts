@@ -4,10 +4,11 @@
 /** After so long without a change the hand rests. */
 const REST_MS = 400;
 
-/** What takes some dozens of answers: asked when the hand rests, and dropped when it moves again. */
+/** What the page asks for a face: dropped when the hand moves on before it is known. */
 export class Rest {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private count = 0;
+  private hasFound = false;
 
   /** The face changes. */
   over(): void {
@@ -15,14 +16,22 @@ export class Rest {
     clearTimeout(this.timer);
   }
 
-  /** `use` gets what `ask` finds, unless the face changes before. What cannot be found leaves what is shown. */
-  begin<Found>(ask: () => Promise<Found>, use: (found: Found) => void): void {
+  /** Whether `begin` with `atOnce` calls `use` before the next picture: at first, parts of the page have to be fetched. */
+  get isQuick(): boolean {
+    return this.hasFound;
+  }
+
+  /** `use` gets what `ask` finds, unless the face changes before. What cannot be found leaves what is shown. Where the page answers within the picture it asks `atOnce`, otherwise when the hand rests. */
+  begin<Found>(ask: () => Promise<Found>, use: (found: Found) => void, atOnce: boolean): void {
     this.over();
     const asked = this.count;
     const answer = async () => {
       const found = await ask();
+      this.hasFound = true;
       if (asked === this.count) use(found);
     };
-    this.timer = setTimeout(() => void answer().catch(() => {}), REST_MS);
+    const begin = () => void answer().catch(() => {});
+    if (atOnce) begin();
+    else this.timer = setTimeout(begin, REST_MS);
   }
 }

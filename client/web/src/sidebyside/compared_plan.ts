@@ -20,7 +20,7 @@ import { Signal } from "../workbench/signal";
 import type { Workbench } from "../workbench/workbench";
 
 /** What of the workbench answers a plan: the model, the session and the page's own answers are those of the planner. */
-export type PlanAnswerer = Pick<Workbench, "file" | "landmarks" | "shapeAt" | "skinAt" | "penetrationsAt" | "posesByHandle" | "modelInfo"> & {
+export type PlanAnswerer = Pick<Workbench, "file" | "landmarks" | "shapeAt" | "planAnswers" | "penetrationsAt" | "posesByHandle" | "modelInfo"> & {
   readonly answers: Pick<Workbench["answers"], "solve">;
   readonly live: Pick<Workbench["live"], "session">;
   readonly model: Pick<Workbench["model"], "value">;
@@ -174,7 +174,7 @@ export class ComparedPlan implements ShownFace {
       if (!this.isAnswered || !this.isFull) await this.solve(poses, isOver);
       if (isOver()) return;
       this.penetrations.value = this.bench.penetrationsAt(poses);
-      const answers = { handles: this.plan.handles, poses: () => poses, skinAt: (others: readonly Pose[]) => this.bench.skinAt(others) };
+      const answers = { handles: this.plan.handles, poses: () => poses, skinPointsAt: this.bench.planAnswers.skinPointsAt };
       const bands = await wholeBands(this, answers);
       const movements = await movementBands(this, answers);
       if (!isOver()) [this.bands, this.movementBands] = [bands, movements];

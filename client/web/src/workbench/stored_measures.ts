@@ -25,7 +25,7 @@ export interface StoredFace {
 /** The numbers of a stored prediction's face, independent of what is on the stage. Rejects with a CallError. */
 export async function storedMeasures({ file, landmarks, comparer, planned, answers }: StoredFace, prediction: Prediction): Promise<Measure[]> {
   const shape = await comparer.between({ from: "rest", to: prediction, share: 1 }, planned);
-  const ofShape = { handles: answers.handles, poses: () => shape.poses, skinAt: (poses: readonly Pose[]) => answers.skinAt(poses) };
+  const ofShape = { handles: answers.handles, poses: () => shape.poses, skinPointsAt: answers.skinPointsAt };
   return toMessages(await measureAtRest(new FaceOfShape(file, landmarks, shape), ofShape));
 }
 

@@ -12,13 +12,14 @@ import type { Prediction } from "../generated/tissueform/v1/prediction_pb";
 import type { ModelInfo } from "../generated/tissueform/v1/server_info_pb";
 import type { DeformationModel } from "../generated/tissueform/v1/session_pb";
 import { BoneSolid, type Penetration, PenetrationTest } from "../geometry/penetration";
+import type { Vector } from "../geometry/rotation";
 import { type Pose, fromLps, toMove } from "../geometry/pose";
 import type { DisplayedFrame } from "../live/drag_session";
 import { type Connection, LiveSession } from "../live/live_session";
 import { LocalAnswers, type LocalState } from "../live/local_answers";
-import type { Anchor } from "../measures/anchor";
 import { type ShownFace, suggestLandmarks } from "../measures/face_measures";
 import { LandmarkBook } from "../measures/landmark_book";
+import type { Anchor } from "../measures/anchor";
 import type { PlanAnswers } from "../measures/whole_band";
 import type { BoundPhotograph } from "../movingdata/photograph_data";
 import { JawOpening } from "../planning/jaw_opening";
@@ -277,23 +278,19 @@ export class Workbench implements ShownFace {
     return forcesN === null ? null : this.touchReader.read(this.newest.displacements, forcesN, areasMm2);
   }
 
-  /** For measures at rest. */
-  get planAnswers(): PlanAnswers {
-    return { handles: this.plan.handles, poses: () => this.plan.poses(), skinAt: (poses) => this.skinAt(poses) };
+  /** Whether `planAnswers` knows what is shown before it is drawn: the page evaluates by itself, and shows the plan. */
+  get answersAtOnce(): boolean {
+    return this.local.answersAtOnce && this.showsPlan;
   }
 
-  /** Where the surfaces' vertices would be under other poses, by the page's own answers; null where it has none of them. */
-  async skinAt(poses: readonly Pose[]): Promise<((surface: number) => Float32Array) | null> {
-    const displacements = await this.displacementsAt(poses);
-    if (displacements === null) return null;
-    const known = new Map<number, Float32Array>();
-    return (surface) => {
-      const { shape } = this.view.head.surfaces[surface];
-      const places = known.get(surface) ?? shape.rest.slice();
-      if (!known.has(surface)) shape.follow(displacements, places);
-      known.set(surface, places);
-      return places;
-    };
+  get planAnswers(): PlanAnswers {
+    return { handles: this.plan.handles, poses: () => this.plan.poses(), skinPointsAt: (poseSets, anchors) => this.skinPointsAt(poseSets, anchors) };
+  }
+
+  /** Where points of the skin would be under other poses, by the page's own answers; null where it has none of them. */
+  async skinPointsAt(poseSets: readonly (readonly Pose[])[], anchors: readonly Anchor[]): Promise<Vector[][] | null> {
+    const { skinPointsAt } = await import("../measures/skin_points");
+    return skinPointsAt(this.file, this.rest, (sets, vertices) => this.local.placesAt(sets, vertices), poseSets, anchors);
   }
 
   /** Skin and bone under other poses, by the page's own answers; null where it has none of them. */

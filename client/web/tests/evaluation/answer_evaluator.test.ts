@@ -26,6 +26,21 @@ test.each(GOLDEN)("%s gives the positions, errors and bands that are written the
   }
 });
 
+test.each(GOLDEN)("%s gives chosen vertices the same places, to the bit, in any order", async (name) => {
+  const evaluator = await openGolden(name);
+  const cases = goldenCases(name);
+  const covered = cases.filter(({ isCovered }) => isCovered).map(({ poses }) => poses);
+  const all = covered.map((poses) => evaluator.evaluate(poses).positions.slice());
+  const count = all[0].length / 3;
+  for (const vertices of [Int32Array.of(count - 1, 0, Math.floor(count / 2)), Int32Array.from({ length: count }, (_, v) => v), Int32Array.of()]) {
+    const expected = all.flatMap((positions) => Array.from(vertices).flatMap((v) => Array.from(positions.subarray(3 * v, 3 * v + 3))));
+    expect(Array.from(evaluator.placesAt(covered, vertices) ?? [NaN])).toEqual(expected);
+  }
+  const beyond = cases.find(({ isCovered }) => !isCovered);
+  if (beyond !== undefined) expect(evaluator.placesAt([covered[0], beyond.poses], Int32Array.of(0))).toBeNull();
+  expect(evaluator.placesAt([[]], Int32Array.of(0))).toBeNull();
+});
+
 test("a handle that turns beyond the range has positions and no band", async () => {
   const evaluator = await openGolden("linear_elastic_band");
   const cases = goldenCases("linear_elastic_band");

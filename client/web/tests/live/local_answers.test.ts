@@ -195,7 +195,7 @@ test("a worker that ends by itself leaves the server to answer until it is asked
   const { gateway, offsets } = server(() => goldenBytes("linear_elastic"));
   const answers = new LocalAnswers(gateway, { onState: (state) => states.push(state), onEvaluation: () => {} }, async (_bytes, _sha256, listener) => {
     endings.push(() => listener.onEnded());
-    return { place: "worker", hasWorkers: true, ask: () => {}, valuesAt: async () => null, close: () => {} };
+    return { place: "worker", hasWorkers: true, ask: () => {}, valuesAt: async () => null, placesAt: async () => null, close: () => {} };
   });
   await answers.follow(configuration());
   expect(states[states.length - 1]).toMatchObject({ kind: "ready", place: "worker" });

@@ -27,19 +27,19 @@ beforeEach(() => vi.resetModules());
 afterEach(() => vi.unstubAllGlobals());
 
 test("a clinic's figures, and those of an operation, are in the intervals", async () => {
-  const { deviationsInUse, operation, modelDeviation, movementBands, asked } = await pageOf(() => Response.json({ deviations: TABLE }));
+  const { deviationsInUse, chosen, modelDeviation, movementBands, asked } = await pageOf(() => Response.json({ deviations: TABLE }));
   expect(await deviationsInUse()).toMatchObject({ source: "our clinic, 40 patients", translationMm: [1, 2, 3] });
   const { shown, answers } = await faceThatFollows(0.7, null);
   const skin = shown.file.manifest.landmarks.findIndex(({ name }) => name === "soft_pogonion");
   const modelOf = async () => (await movementBands(shown, answers))?.[skin]?.totalMm.parts;
-  const [all, own] = [await modelOf(), ((operation.value = "bsso"), await modelOf())];
+  const [all, own] = [await modelOf(), ((chosen.operation = "bsso"), await modelOf())];
   expect(all?.source).toBe("our clinic, 40 patients");
   expect(own?.source).toBe("our clinic, bsso");
   expect((own?.model ?? NaN) / (all?.model ?? NaN)).toBeCloseTo(2, 6);
   expect(own?.surgery).toBe(all?.surgery);
   expect(modelDeviation(await deviationsInUse(), "soft_menton")).toBe(4);
   expect(modelDeviation(await deviationsInUse(), "soft_glabella")).toBe(1);
-  operation.value = "another";
+  chosen.operation = "another";
   expect((await deviationsInUse()).source).toBe("our clinic, 40 patients");
   expect(asked).toHaveBeenCalledTimes(1);
 });

@@ -67,10 +67,10 @@ test("a segment that the plan leaves in place is not missed", async () => {
   const both: PlanAnswers = {
     handles: [...answers.handles, { name: "maxilla" }],
     poses: () => [...answers.poses(), resting],
-    skinAt: async (poses) => {
-      asked += 1;
-      expect(poses[1]).toEqual(resting);
-      return answers.skinAt(poses.slice(0, 1));
+    skinPointsAt: async (poseSets, anchors) => {
+      asked += poseSets.length;
+      poseSets.forEach((poses) => expect(poses[1]).toEqual(resting));
+      return answers.skinPointsAt(poseSets.map((poses) => poses.slice(0, 1)), anchors);
     },
   };
   expect(await movementBands(shown, both)).toEqual(await movementBands(shown, answers));
@@ -79,7 +79,7 @@ test("a segment that the plan leaves in place is not missed", async () => {
 
 test("a plan that moves nothing has no band, and none is known where the page cannot answer", async () => {
   const { shown, answers, plan } = await faceThatFollows(0.7, null);
-  expect(await movementBands(shown, { ...answers, skinAt: async () => null })).toBeNull();
+  expect(await movementBands(shown, { ...answers, skinPointsAt: async () => null })).toBeNull();
   plan.change(0, { forwardMm: 0, yawDeg: 0 }, true);
   expect(await movementBands(shown, answers)).toBeNull();
   expect(await wholeBands(shown, answers)).toBeNull();

@@ -90,5 +90,5 @@ test("the band of the material makes it wider, as independent parts add", async 
 
 test("where the page has no answers there is none", async () => {
   const { shown, answers } = await faceThatFollows(0.7, null);
-  expect(await wholeBands(shown, { ...answers, skinAt: async () => null })).toBeNull();
+  expect(await wholeBands(shown, { ...answers, skinPointsAt: async () => null })).toBeNull();
 });

@@ -36,7 +36,7 @@ async function compared({ own = async () => null, solve = async (file, poses) =>
     landmarks: new LandmarkBook(file),
     shapeAt: (poses: Pose[]) => (asked.push(`page ${forward(poses)}`), own(file, poses)),
     answers: { solve: (_: string, __: number, poses: Pose[]) => (asked.push(`server ${forward(poses)}`), solve(file, poses)) },
-    skinAt: async () => null,
+    planAnswers: { skinPointsAt: async () => null },
     penetrationsAt: () => [],
     posesByHandle: (poses: readonly Pose[]) => new Map([["mandible", poses[0]]]),
     modelInfo: () => ({ name: model }),

@@ -34,7 +34,7 @@ async function opened(stored = [STORED], isThere = true) {
     localState: new Signal({ kind: "ready" }),
     connection: new Signal({ kind: "live" }),
     shapeAt,
-    skinAt: async () => null,
+    planAnswers: { skinPointsAt: async () => null },
     penetrationsAt: () => [],
     posesByHandle: (poses: readonly Pose[]) => new Map([["mandible", poses[0]]]),
     modelInfo: () => ({ name: "linear_elastic" }),

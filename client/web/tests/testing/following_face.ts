@@ -1,14 +1,20 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
-import { openCase } from "../../src/case/case_file";
+import { type CaseFile, openCase } from "../../src/case/case_file";
 import { type Pose, movedPoint } from "../../src/geometry/pose";
 import { pointAt } from "../../src/geometry/rigid_fit";
+import { anchorPoint } from "../../src/measures/anchor";
 import type { ShownFace } from "../../src/measures/face_measures";
 import { LandmarkBook } from "../../src/measures/landmark_book";
 import type { PlanAnswers } from "../../src/measures/whole_band";
 import { Plan } from "../../src/planning/plan";
 import { smallCase, sourceOf } from "./small_case";
+
+/** For PlanAnswers, by where the whole skin is. */
+export function skinPointsOf({ surfaces }: CaseFile, skinUnder: (poses: readonly Pose[]) => (surface: number) => Float32Array): PlanAnswers["skinPointsAt"] {
+  return async (poseSets, anchors) => poseSets.map((poses) => anchors.map((anchor) => anchorPoint({ positions: skinUnder(poses)(anchor.surface), triangles: surfaces[anchor.surface].triangles }, anchor)));
+}
 
 /** Skin and a lower jaw: the skin goes with the jaw by `share` of its way. */
 export async function faceThatFollows(share: number, bandMm: number | null) {
@@ -35,6 +41,6 @@ export async function faceThatFollows(share: number, bandMm: number | null) {
     bandOf: (surface) => (bandMm === null ? null : new Float32Array(file.surfaces[surface].positions.length / 3).fill(bandMm)),
     showsPlan: true,
   };
-  const answers: PlanAnswers = { handles: plan.handles, poses: () => plan.poses(), skinAt: async (poses) => skinUnder(poses) };
+  const answers: PlanAnswers = { handles: plan.handles, poses: () => plan.poses(), skinPointsAt: skinPointsOf(file, skinUnder) };
   return { file, shown, answers, plan };
 }

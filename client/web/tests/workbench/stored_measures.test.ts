@@ -10,6 +10,7 @@ import type { Pose } from "../../src/geometry/pose";
 import { Plan } from "../../src/planning/plan";
 import { Comparer } from "../../src/workbench/comparison";
 import { storedMeasures } from "../../src/workbench/stored_measures";
+import { skinPointsOf } from "../testing/following_face";
 import { smallCase, sourceOf } from "../testing/small_case";
 
 const STORED_MM = 2;
@@ -28,7 +29,7 @@ async function asked(canAnswer = false) {
   const comparer = new Comparer(plan, { ofPrediction: async () => stored }, () => new Promise((done) => (answer = done)));
   const planned = { displacements: new Float32Array(3 * count), uncertainty: null as Float32Array | null, poses: plan.poses() };
   const prediction = create(PredictionSchema, { poses: [{ handle: "mandible", rotationVector: {}, pivotMm: {}, translationMm: { x: 3, y: 0, z: 0 }, scale: 1 }] });
-  const answers = { handles: plan.handles, poses: () => plan.poses(), skinAt: canAnswer ? skinAfterJaw(file) : async () => null };
+  const answers = { handles: plan.handles, poses: () => plan.poses(), skinPointsAt: canAnswer ? skinPointsOf(file, skinAfterJaw(file)) : async () => null };
   const measures = storedMeasures({ file, landmarks, comparer, planned, answers }, prediction);
   await new Promise((done) => setTimeout(done, 0));
   return { file, plan, planned, measures, answer: (isKnown: boolean) => answer(isKnown ? new Float32Array(count).fill(BAND_MM) : null) };
@@ -36,7 +37,7 @@ async function asked(canAnswer = false) {
 
 /** Skin that goes along with the jaw, whole. */
 function skinAfterJaw(file: CaseFile) {
-  return async ([pose]: readonly Pose[]) => (surface: number) => file.surfaces[surface].positions.map((value, i) => value + pose.translationMm[i % 3]);
+  return ([pose]: readonly Pose[]) => (surface: number) => file.surfaces[surface].positions.map((value, i) => value + pose.translationMm[i % 3]);
 }
 
 test("where the page can answer, the interval holds surgery and model, too, and says so", async () => {

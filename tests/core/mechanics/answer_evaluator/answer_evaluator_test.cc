@@ -58,6 +58,29 @@ TEST_P(EvaluatedModelTest, IdentityGivesRest) {
   EXPECT_EQ(Eigen::Map<const FloatPositions>(positions.data(), rest.rows(), 3), rest);
 }
 
+TEST_P(EvaluatedModelTest, ChosenVerticesAreWhereTheWholeAnswerHasThem) {
+  const AnswerEvaluator evaluator(response_->Describe());
+  std::vector<AnswerPose> poses(GetParam().num_handles);
+  poses[0].translation_mm = {0.3, -0.2, 0.1};
+  poses[0].rotation_vector = {0.02, 0.01, -0.03};
+  std::vector<float> positions;
+  ASSERT_TRUE(evaluator.Answer(poses, &positions));
+  const auto count = static_cast<int32_t>(positions.size() / 3);
+  std::vector<int32_t> vertices;  // of all kinds, not in their order, one of them twice
+  for (int32_t v = 0; v < count; ++v) vertices.push_back((v * 7 + 3) % count);
+  vertices.push_back(vertices[0]);
+  const std::vector<ChosenVertex> chosen = evaluator.Choose(vertices);
+  std::vector<float> of_chosen(3 * chosen.size());
+  ASSERT_TRUE(evaluator.AnswerAt(poses, chosen, of_chosen.data()));
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_EQ(of_chosen[3 * i + axis], positions[3 * static_cast<size_t>(vertices[i]) + axis]);
+    }
+  }
+  poses[0].scale = 0;
+  EXPECT_FALSE(evaluator.AnswerAt(poses, chosen, of_chosen.data()));
+}
+
 TEST_P(EvaluatedModelTest, PosesThatNobodyMayAskForAreNotCovered) {
   const AnswerEvaluator evaluator(response_->Describe());
   std::vector<float> positions = {1, 2, 3};
