@@ -108,7 +108,7 @@ function plannerMovements(page: Page): Promise<string[]> {
   return page.locator("section[aria-label=Movements] tbody tr").evaluateAll((all) => all.map((row) => (row.querySelectorAll("td")[3].firstChild?.textContent ?? "").replace("·", "0.0")));
 }
 
-const wholeIsShown = (page: Page) => page.getByText("if surgery and model err as published").first().waitFor();
+const wholeIsShown = (page: Page) => page.getByText("Below “after”: where 95 of 100 patients").waitFor();
 
 describe("a whole head", () => {
   let page: Page;
