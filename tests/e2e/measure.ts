@@ -40,6 +40,12 @@ test.each(["gradient_field", "linear_elastic", "neo_hookean"])("pose to position
   console.log(JSON.stringify({ model: name, ...chosen, ...result }, null, 1));
 }, 1000 * SECONDS + 120_000);
 
+test("an answer, and an answer with the whole interval of each landmark", async () => {
+  const { page } = await openCase(await planner.browse(), planner);
+  await page.evaluate(chooseOwnAnswers, "linear_elastic");
+  console.log(JSON.stringify(await page.evaluate(timeIntervals), null, 1));
+}, 120_000);
+
 test("from a target to the bone that gives it, while one pulls", async () => {
   const { page } = await openCase(await planner.browse(), planner);
   await page.evaluate(() => (globalThis as unknown as { tissueform: any }).tissueform.view.stage.setDrawing(false));
@@ -186,4 +192,27 @@ test("a CT of 600 slices of 512 x 512 is read, and one of 400 by the memory of t
 function rendererMiB(): number {
   const lines = execFileSync("ps", ["-eo", "rss,args"], { encoding: "utf8", maxBuffer: 2 ** 24 }).split("\n").filter((line) => line.includes("--type=renderer"));
   return Math.max(0, ...lines.map((line) => Number(line.trim().split(/\s+/)[0]) / 1024));
+}
+
+/** What the interval asks is taken from the page; a segment has to be moved first. */
+async function timeIntervals() {
+  const { bench } = (globalThis as unknown as { tissueform: any }).tissueform;
+  const { host } = bench.local;
+  let asked: { sets: unknown[][]; vertices: Int32Array } | null = null;
+  const own = host.placesAt.bind(host);
+  host.placesAt = (sets: unknown[][], vertices: Int32Array) => own(...((asked = { sets, vertices }), [sets, vertices]));
+  bench.plan.change(0, { forwardMm: -6 }, true);
+  while (asked === null) await new Promise((done) => setTimeout(done, 100));
+  const { sets, vertices } = asked as { sets: unknown[][]; vertices: Int32Array };
+  const median = (run: () => void) => {
+    const times = Array.from({ length: 200 }, () => {
+      const start = performance.now();
+      for (let i = 0; i < 10; ++i) run();
+      return (performance.now() - start) / 10;
+    });
+    return times.sort((a, b) => a - b)[100];
+  };
+  const answer = () => host.evaluator.evaluate(sets[0]);
+  const [answerMs, bothMs] = [median(answer), median(() => (answer(), host.evaluator.placesAt(sets, vertices)))];
+  return { poseSets: sets.length, vertices: vertices.length, answerMs, bothMs, ratio: bothMs / answerMs };
 }
