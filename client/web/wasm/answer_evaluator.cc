@@ -103,7 +103,8 @@ EXPORT(choose) float* Choose() {
 // `choose` said.
 EXPORT(evaluate_chosen) bool EvaluateChosen() {
   auto& self = tissueform::Self();
-  return self.evaluator->AnswerAt(self.poses, self.chosen, self.chosen_positions.data());
+  return tissueform::AnswerAt(*self.evaluator, self.poses, self.chosen,
+                              self.chosen_positions.data());
 }
 
 EXPORT(positions) const float* Positions() { return tissueform::Self().positions.data(); }

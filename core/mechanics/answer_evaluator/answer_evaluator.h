@@ -17,6 +17,17 @@
 
 namespace tissueform {
 
+template <typename Matrix>
+class BasicAnswerEvaluator;
+
+// Of the bytes as they come, for clients and browsers.
+using AnswerEvaluator = BasicAnswerEvaluator<PackedMatrix>;
+
+// What AnswerEvaluator::Answer writes of chosen vertices (AnswerEvaluator::Choose), 3 numbers each,
+// the same to the bit; false likewise. Costs the factors of the poses and little for each vertex.
+bool AnswerAt(const AnswerEvaluator& evaluator, std::span<const AnswerPose> poses,
+              std::span<const ChosenVertex> chosen, float* positions);
+
 // Prepared answers at work, by the standard library alone: everywhere they are evaluated by this,
 // on servers (VertexResponse) with another `Matrix`, which keeps entries as its processor likes
 // them and reads as much of them as the tolerance needs. Two that read differently differ by less
@@ -55,10 +66,6 @@ class BasicAnswerEvaluator {
   // Where vertices of an answer are found, by their numbers in it. REQUIRES: numbers in [0, number
   // of vertices).
   std::vector<ChosenVertex> Choose(std::span<const int32_t> vertices) const;
-  // What Answer writes of chosen vertices, 3 numbers each, the same to the bit. Costs the factors
-  // of the poses and little for each vertex.
-  bool AnswerAt(std::span<const AnswerPose> poses, std::span<const ChosenVertex> chosen,
-                float* positions) const requires(!Matrix::kKeepsEntries);
 
   // The same of poses that need not be covered. REQUIRES: legal poses (AreLegal).
   void Evaluate(std::span<const AnswerPose> poses, float* positions) const;
@@ -80,6 +87,9 @@ class BasicAnswerEvaluator {
   size_t bytes_held() const;
 
  private:
+  friend bool AnswerAt(const AnswerEvaluator& evaluator, std::span<const AnswerPose> poses,
+                       std::span<const ChosenVertex> chosen, float* positions);
+
   // Of a pose of every handle.
   struct Product {
     std::vector<double> factors;  // of the compressed columns
@@ -99,8 +109,5 @@ class BasicAnswerEvaluator {
   ContactForces contact_;
   FreeVertices<Matrix> free_;
 };
-
-// Of the bytes as they come, for clients and browsers.
-using AnswerEvaluator = BasicAnswerEvaluator<PackedMatrix>;
 
 }  // namespace tissueform

@@ -84,24 +84,6 @@ std::vector<ChosenVertex> BasicAnswerEvaluator<Matrix>::Choose(
 }
 
 template <typename Matrix>
-bool BasicAnswerEvaluator<Matrix>::AnswerAt(std::span<const AnswerPose> poses,
-                                            std::span<const ChosenVertex> chosen,
-                                            float* positions) const
-    requires(!Matrix::kKeepsEntries) {
-  const Product product = CheckedProductOf(poses);
-  if (!AreCovered(answers_, poses, product.error_mm)) return false;
-  for (const ChosenVertex& vertex : chosen) {
-    if (vertex.region == PortableAnswers::kFree) {
-      free_.MoveOne(answers_, sizes_, product.factors, vertex, positions);
-    } else {
-      VertexPlaces::PlaceOne(answers_, poses, vertex.region, vertex.rank, positions);
-    }
-    positions += 3;
-  }
-  return true;
-}
-
-template <typename Matrix>
 void BasicAnswerEvaluator<Matrix>::Evaluate(std::span<const AnswerPose> poses,
                                             float* positions) const {
   Write(poses, ProductOf(poses), positions);

@@ -71,14 +71,14 @@ TEST_P(EvaluatedModelTest, ChosenVerticesAreWhereTheWholeAnswerHasThem) {
   vertices.push_back(vertices[0]);
   const std::vector<ChosenVertex> chosen = evaluator.Choose(vertices);
   std::vector<float> of_chosen(3 * chosen.size());
-  ASSERT_TRUE(evaluator.AnswerAt(poses, chosen, of_chosen.data()));
+  ASSERT_TRUE(AnswerAt(evaluator, poses, chosen, of_chosen.data()));
   for (size_t i = 0; i < vertices.size(); ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
       EXPECT_EQ(of_chosen[3 * i + axis], positions[3 * static_cast<size_t>(vertices[i]) + axis]);
     }
   }
   poses[0].scale = 0;
-  EXPECT_FALSE(evaluator.AnswerAt(poses, chosen, of_chosen.data()));
+  EXPECT_FALSE(AnswerAt(evaluator, poses, chosen, of_chosen.data()));
 }
 
 TEST_P(EvaluatedModelTest, PosesThatNobodyMayAskForAreNotCovered) {
