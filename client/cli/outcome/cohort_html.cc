@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 #include <tuple>
@@ -34,7 +35,8 @@ std::string Percent(const Json& share) {
 }
 
 std::string Fixed(const Json& value) {
-  return value.is_null() ? "" : absl::StrFormat("%.2f", value.get<double>());
+  if (value.is_null()) return "";
+  return absl::StrFormat("%.2f", std::round(100 * value.get<double>()) / 100 + 0.0);  // no "-0.00"
 }
 
 Json DistanceRow(const Json& row) {
