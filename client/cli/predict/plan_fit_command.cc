@@ -108,7 +108,8 @@ absl::StatusOr<PreparedFit> Prepare(const PlanProblem& plan, const FitProblem& p
   TF_ASSIGN_OR_RETURN(prepared.deformer, CreateDeformer(prepared.preparation, plan.deformer));
   ResponseOptions options{.model = plan.deformer.model,
                           .tolerance_mm = kPreparedToleranceMm,
-                          .max_rotation_rad = LargestFitRotation(problem)};
+                          .max_rotation_rad = LargestFitRotation(problem),
+                          .seal = plan.deformer.seal};
   for (const HandlePose& pose : problem.poses) {
     options.max_scale_change = std::max(options.max_scale_change, std::abs(pose.scale - 1));
   }
@@ -162,6 +163,7 @@ absl::Status RunPlanFit(const PlanFitOptions& options) {
   if (!options.model.empty()) {
     TF_ASSIGN_OR_RETURN(plan.model, ModelFromName(options.model));
   }
+  TF_RETURN_IF_ERROR(CheckSeal(options.plan, options.reading.resolve, plan));
   TF_ASSIGN_OR_RETURN(PlanProblem resolved, ResolvePlan(plan, options.reading.resolve));
   TF_RETURN_IF_ERROR(CheckModel(plan, resolved.constraints));
   resolved.deformer.preparation.threads = options.threads;
@@ -249,7 +251,7 @@ void AddPlanFitCommand(CLI::App& app, CommandWork* work) {
   fit->add_flag("--accept-misses", options->accept_misses,
                 "exit code 0 even if a target is not reached; the report still states it");
   fit->add_flag("--json", options->json, "print the report as JSON");
-  AddPlanOptions(fit, &options->reading);
+  AddPlanOptions(fit, &options->reading, LipSealUse::kComputed);
   fit->footer(kFooter);
   fit->callback([options, work] { *work = [options] { return RunPlanFit(*options); }; });
 }

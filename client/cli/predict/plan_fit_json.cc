@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/cli/predict/fit_values.h"
+#include "client/cli/shared/stats_json.h"
 #include "client/cli/shared/version.h"
 #include "core/mesh/io/tet_mesh_io.h"
 #include "core/planning/json_values.h"
@@ -99,34 +100,36 @@ OrderedJson FitReportJson(const FitReport& report) {
   for (const auto& [a, b] : fit.contradictions) {
     contradictions.push_back({report.problem->targets[a].name, report.problem->targets[b].name});
   }
-  return {{"format", "tissueform-fit"},
-          {"version", kVersion},
-          {"plan", report.plan_path},
-          {"targets_file", report.targets_path},
-          {"model", report.model},
-          {"coordinate_system", report.problem->axes == CoordinateSystem::kRas ? "RAS" : "LPS"},
-          {"symmetric", report.problem->symmetric},
-          {"less_movement", report.problem->less_movement},
-          {"tolerance_mm", report.problem->tolerance_mm},
-          {"reached", CheckReached(report).ok()},
-          {"targets", TargetsJson(report)},
-          {"parameters", ParametersJson(report)},
-          {"handles", HandlesJson(report)},
-          {"contradictions", std::move(contradictions)},
-          {"equations", report.problem->num_equations()},
-          {"directions", DirectionsJson(report)},
-          {"movement_rms_mm", fit.movement_mm},
-          {"converged", fit.converged},
-          {"iterations", fit.iterations},
-          {"verified", fit.verified},
-          {"model_converged", fit.model_converged},
-          {"model_answers", fit.model_answers},
-          {"prepared_error_mm", fit.prepared_error_mm},
-          {"seconds",
-           {{"prepare", report.prepare_seconds},
-            {"search", fit.search_seconds},
-            {"fit", report.fit_seconds}}},
-          {"notice", kNotMedicalDeviceNotice}};
+  OrderedJson json = {
+      {"format", "tissueform-fit"},
+      {"version", kVersion},
+      {"plan", report.plan_path},
+      {"targets_file", report.targets_path},
+      {"model", report.model},
+      {"coordinate_system", report.problem->axes == CoordinateSystem::kRas ? "RAS" : "LPS"},
+      {"symmetric", report.problem->symmetric},
+      {"less_movement", report.problem->less_movement},
+      {"tolerance_mm", report.problem->tolerance_mm},
+      {"reached", CheckReached(report).ok()},
+      {"targets", TargetsJson(report)},
+      {"parameters", ParametersJson(report)},
+      {"handles", HandlesJson(report)},
+      {"contradictions", std::move(contradictions)},
+      {"equations", report.problem->num_equations()},
+      {"directions", DirectionsJson(report)},
+      {"movement_rms_mm", fit.movement_mm},
+      {"converged", fit.converged},
+      {"iterations", fit.iterations},
+      {"verified", fit.verified},
+      {"model_converged", fit.model_converged},
+      {"model_answers", fit.model_answers},
+      {"prepared_error_mm", fit.prepared_error_mm}};
+  if (fit.seal) json["seal"] = SealToJson(*fit.seal);
+  json["seconds"] = {{"prepare", report.prepare_seconds},
+                     {"search", fit.search_seconds},
+                     {"fit", report.fit_seconds}};
+  json["notice"] = kNotMedicalDeviceNotice;
+  return json;
 }
 
 }  // namespace tissueform

@@ -13,6 +13,7 @@
 #include "absl/strings/str_join.h"
 
 #include "client/cli/predict/fit_values.h"
+#include "client/cli/shared/stats_json.h"
 #include "core/mesh/io/tet_mesh_io.h"
 
 namespace tissueform {
@@ -148,6 +149,7 @@ std::string FitReportText(const FitReport& report) {
       "reached by the full model (%d answers); prepared answers differ from it by "
       "at most %.4f mm\n",
       fit.model_answers, fit.prepared_error_mm);
+  if (fit.seal) absl::StrAppend(&text, SealText(*fit.seal), "\n");
   absl::StrAppend(&text, ContradictionsText(report), UndeterminedText(report));
   absl::StrAppend(
       &text,

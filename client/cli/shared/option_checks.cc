@@ -44,7 +44,7 @@ void AddSeal(CLI::App* command, LipSealUse use, bool* seal) {
                             throw CLI::ValidationError(
                                 "--seal",
                                 "this command does not compute the lip seal; use tissueform "
-                                "deform, run or drag with --seal");
+                                "deform, plan fit, run or drag with --seal");
                           })
       ->group("");  // not in --help
 }

@@ -57,19 +57,8 @@ OrderedJson ContactToJson(const PredictionStats& stats) {
   json["pressing_rows"] = stats.contact->pressing_rows;
   if (stats.contact->max_force_n) json["max_force_n"] = *stats.contact->max_force_n;
   json["residual_mm"] = stats.contact->residual_mm;
-  if (stats.seal) {
-    json["seal"] = {{"pairs", stats.seal->pairs},
-                    {"released", stats.seal->released},
-                    {"parted_mm", stats.seal->parted_mm},
-                    {"release_mm", kSealReleaseMm}};
-  }
+  if (stats.seal) json["seal"] = SealToJson(*stats.seal);
   return json;
-}
-
-std::string SealText(const SealAnswer& seal) {
-  if (!seal.released) return absl::StrFormat("sealed: %d pairs, released: no", seal.pairs);
-  return absl::StrFormat("sealed: 0 of %d pairs, released: yes (parted by %.1f mm, limit %.0f mm)",
-                         seal.pairs, seal.parted_mm, kSealReleaseMm);
 }
 
 std::string ContactText(const PredictionStats& stats) {
@@ -110,6 +99,19 @@ std::string WhyItGaveUp(const SolveSummary& solve) {
 }
 
 }  // namespace
+
+nlohmann::ordered_json SealToJson(const SealAnswer& seal) {
+  return {{"pairs", seal.pairs},
+          {"released", seal.released},
+          {"parted_mm", seal.parted_mm},
+          {"release_mm", kSealReleaseMm}};
+}
+
+std::string SealText(const SealAnswer& seal) {
+  if (!seal.released) return absl::StrFormat("sealed: %d pairs, released: no", seal.pairs);
+  return absl::StrFormat("sealed: 0 of %d pairs, released: yes (parted by %.1f mm, limit %.0f mm)",
+                         seal.pairs, seal.parted_mm, kSealReleaseMm);
+}
 
 PredictionStats StatsOf(const PlanProblem& problem) {
   PredictionStats stats;

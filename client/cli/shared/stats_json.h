@@ -47,6 +47,10 @@ struct PredictionStats {
 // The counts, model and mode of a problem; the rest is left for the caller to fill.
 PredictionStats StatsOf(const PlanProblem& problem);
 
+// What every result states of sealed lips.
+nlohmann::ordered_json SealToJson(const SealAnswer& seal);
+std::string SealText(const SealAnswer& seal);
+
 // Keys in the order in which docs/plan-format.md lists them; with version and notice.
 nlohmann::ordered_json StatsToJson(const PredictionStats& stats);
 

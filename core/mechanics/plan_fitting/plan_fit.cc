@@ -83,6 +83,7 @@ class Fitting {
     TF_RETURN_IF_ERROR(options_.cancellation.Check());
     ++fit->model_answers;
     fit->verified = true;
+    fit->seal = answer.seal;
     fit->model_converged = answer.summary.converged && answer.summary.load >= 1;
     return Positions(answer.positions(rows_.vertices(), Eigen::all));
   }

@@ -62,7 +62,8 @@ struct PlanFit {
   // Of the full model; without one verified is false.
   bool verified = false;
   bool model_converged = true;
-  int model_answers = 0;  // how often it was asked
+  int model_answers = 0;           // how often it was asked
+  std::optional<SealAnswer> seal;  // of its last answer, of lips that were asked to be sealed
   // How far the prepared answers lay from it, the largest of the targets' numbers.
   double prepared_error_mm = 0;
   double search_seconds = 0;  // without the full model

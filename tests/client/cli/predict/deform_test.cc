@@ -571,8 +571,8 @@ TEST_F(DeformTest, LipsAreSealedWhenAskedAndTheResultSaysSo) {
   for (const std::string command : {"compare", "export"}) {
     EXPECT_THAT(
         Run({command, "plan.json", "--seal"}).err,
-        HasSubstr("this command does not compute the lip seal; use tissueform deform, run or "
-                  "drag"));
+        HasSubstr("this command does not compute the lip seal; use tissueform deform, plan fit, "
+                  "run or drag"));
   }
 }
 

@@ -8,8 +8,10 @@
 #include "nlohmann/json.hpp"
 
 #include "core/mesh/io/tet_mesh_io.h"
+#include "core/planning/planned_contact.h"
 #include "core/planning/skin_places.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/parted_block.h"
 #include "tests/testing/run_tissueform.h"
 #include "tests/testing/status_matchers.h"
 
@@ -151,6 +153,44 @@ TEST_F(PlanFitTest, BadTargetsAreOneLineAndNothingIsWritten) {
 }
 
 // A lower jaw turned and moved; the fit only receives `deform`'s answer at places of the face.
+// The lower edge follows the upper one only where lips are sealed.
+TEST_F(PlanFitTest, SealedLipsAreFittedWithTheirSeal) {
+  const PartedBlock block;
+  ASSERT_THAT(
+      WriteTetMesh(Path("bar.vtu"), {.mesh = block.mesh, .point_data = {}, .cell_data = {}}),
+      IsOk());
+  Json plan = ReadJson(TestDataPath("plans/bar/plan.json"));
+  plan.erase("mesh_sha256");
+  plan["version"] = 4;
+  plan["model"] = "linear_elastic";
+  plan["stiffness"] = {{"uniform", 15000}};
+  plan["fixed"] = {{"vertices", PartedBlock::Fixed()}};
+  plan["handles"] = {{{"name", "top"}, {"region", {{"vertices", PartedBlock::Top()}}}}};
+  plan["contact"] = ContactToJson(block.rows, {"top"}, CoordinateSystem::kLps);
+  plan["contact"]["seal"] = LipEdgeToJson(block.Edge(), CoordinateSystem::kLps);
+  Write("plan.json", plan.dump());
+  const int32_t lower = block.Edge().pairs[1].lower;
+  targets_["free"] = {{{"handle", "top"}, {"translation_mm", {nullptr, nullptr, {0, 2}}}}};
+  targets_["targets"] = {
+      {{"name", "edge"}, {"at", {{"vertices", {lower}}}}, {"along", {0, 0, 1}}, {"by_mm", 0.2}}};
+  targets_["less_movement"] = 0;
+  targets_["tolerance_mm"] = 0.001;
+  EXPECT_THAT(Fit({"--out", "free.json"}).err, HasSubstr("edge")) << "parted lips stay behind";
+
+  const ProcessResult result = Fit({"--seal", "--out", "fitted.json", "--report", "report.json"});
+  ASSERT_THAT(result, Succeeds());
+  EXPECT_THAT(result.out, HasSubstr("\nsealed: 3 pairs, released: no\n"));
+  EXPECT_EQ(ReadJson(Path("report.json"))["seal"]["pairs"], 3);
+  const auto height = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"deform", "fitted.json", "--out", "after.vtu"};
+    words.insert(words.end(), more.begin(), more.end());
+    EXPECT_THAT(Run(words), Succeeds());
+    return ReadTetMesh(Path("after.vtu"))->mesh.positions()(lower, 2);
+  };
+  EXPECT_NEAR(height({"--seal"}), 2.2, 0.001);
+  EXPECT_LT(height({}), 2.1);
+}
+
 TEST_F(PlanFitTest, KnownPoseOfABundledHeadIsFoundAgain) {
   const std::string head = TestDataPath("plans/head");
   Json plan = ReadJson(head + "/plan.json");
