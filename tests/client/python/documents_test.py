@@ -13,6 +13,7 @@ import unittest.mock
 
 import meshio
 import nbclient
+import nbconvert
 import nbformat
 import numpy as np
 import tissueform
@@ -67,7 +68,7 @@ class SpeedTest(unittest.TestCase):
 
 class NotebookTest(unittest.TestCase):
     def run_notebook(self, name):
-        """The text of its outputs."""
+        """The text of its outputs. Writes a page of it beside the other documentation."""
         notebook = nbformat.read(SOURCE / "docs/examples/python" / name, as_version=4)
         for cell in notebook.cells:
             self.assertFalse(cell.get("outputs"), "stored without outputs, which could hold anything")
@@ -77,6 +78,10 @@ class NotebookTest(unittest.TestCase):
                            "TISSUEFORM_SOURCE": str(SOURCE), "MPLCONFIGDIR": folder, "TMPDIR": folder, "IPYTHONDIR": folder, "HOME": folder}
             with unittest.mock.patch.dict(os.environ, environment):
                 nbclient.NotebookClient(notebook, timeout=120, kernel_name="venv", resources={"metadata": {"path": folder}}).execute()
+        page, _ = nbconvert.HTMLExporter().from_notebook_node(notebook)
+        pages = BIN.parent.parent / "docs/examples"
+        pages.mkdir(parents=True, exist_ok=True)
+        (pages / name).with_suffix(".html").write_text(page)
         return json.dumps(notebook.cells)
 
     def test_the_bar_is_dragged(self):
@@ -86,6 +91,12 @@ class NotebookTest(unittest.TestCase):
         text = self.run_notebook("stiffness_study.ipynb")
         self.assertIn("image/png", text)
         self.assertRegex(text, r"ratio 32: tip moves \d")
+
+    def test_a_ct_leads_to_a_plan_and_a_face(self):
+        text = self.run_notebook("ct_to_face.ipynb")
+        self.assertIn("image/png", text)
+        self.assertIn("handle  mandible", text)
+        self.assertRegex(text, r"jaw 6 mm forward: skin of the chin 5\.\d mm")
 
     def test_labels_lead_to_a_plan_and_a_face(self):
         text = self.run_notebook("labels_to_face.ipynb")
