@@ -24,9 +24,10 @@ from ._versions import check_libraries
 check_libraries()
 
 from ._channel import Tls  # noqa: E402  (the libraries are checked first)
-from .adaptors import from_meshio, to_meshio, to_pyvista  # noqa: E402
+from .adaptors import from_meshio, from_nibabel, to_meshio, to_pyvista  # noqa: E402
 from .async_drag import AsyncDrag  # noqa: E402
 from .client import Client, ServerInfo, connect  # noqa: E402
+from .dicom import from_dicom  # noqa: E402
 from .doctor import DoctorLine, doctor  # noqa: E402
 from .drag import Drag  # noqa: E402
 from .errors import (AccessDenied, Cancelled, Conflict, DataDamaged, DeadlineExceeded, InvalidInput, LimitExceeded,  # noqa: E402
@@ -50,6 +51,6 @@ __all__ = [
     "DoctorLine", "Drag", "Export", "FIXED_BONE", "Fit", "FitTarget", "FittedTarget", "Frame", "Freedom", "InvalidInput", "LimitExceeded", "LipEdge",
     "LocalServer", "MaterialRanges", "Measure", "Mesh", "NotFound", "Plan", "Pose", "Prediction", "Prepared", "PreparedAnswers",
     "ServerError", "ServerInfo", "ServerUnavailable", "Session", "StoredPrediction", "Tls", "TissueformError", "Unauthenticated", "Volume",
-    "boundary_triangles", "connect", "doctor", "from_meshio", "local", "outcome", "outcome_cohort", "ras_to_lps", "read_plan", "sample_bar",
-    "to_meshio", "to_pyvista",
+    "boundary_triangles", "connect", "doctor", "from_dicom", "from_meshio", "from_nibabel", "local", "outcome", "outcome_cohort", "ras_to_lps", "read_plan",
+    "sample_bar", "to_meshio", "to_pyvista",
 ]

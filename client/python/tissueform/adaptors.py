@@ -1,6 +1,6 @@
 # Copyright 2026 The Tissueform Authors.
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Meshes of meshio and PyVista, which are optional: pip install 'tissueform[meshio,pyvista]'."""
+"""Meshes of meshio and PyVista and images of nibabel, which are optional: pip install 'tissueform[meshio,pyvista,nibabel]'."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .errors import InvalidInput
 from .meshes import STIFFNESS_ARRAY
+from .volumes import Volume
 
 
 def from_meshio(mesh: Any) -> Tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], Optional[npt.NDArray[np.float64]]]:
@@ -40,3 +41,11 @@ def to_pyvista(points: npt.ArrayLike, tets: npt.ArrayLike, positions: npt.ArrayL
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: np.asarray(tets)}, np.asarray(positions))
     grid.point_data["displacement_mm"] = np.asarray(positions, dtype=np.float64) - np.asarray(points)
     return grid
+
+
+def from_nibabel(image: Any) -> Volume:
+    """The Volume of an image of nibabel: a CT in Hounsfield units or a label map. Errors: InvalidInput (not three axes)."""
+    values = np.asanyarray(image.dataobj)
+    if values.ndim != 3:
+        raise InvalidInput(f"the image has {values.ndim} axes, not three", advice="take one volume of it")
+    return Volume(values, image.affine, "RAS")

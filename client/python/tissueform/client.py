@@ -135,7 +135,7 @@ class Client:
         the build on the server.
 
         ct: a Volume of Hounsfield units, or the path of a .nrrd, .nii, .nii.gz or .mha file. Geometry and values are sent, and no text of
-        the file. A DICOM folder is read by `tissueform plan build --server`. recipe: a dict or the path of a file (docs/recipe-format.md).
+        the file. A DICOM folder is read by from_dicom. recipe: a dict or the path of a file (docs/recipe-format.md).
         labels: a label map of the CT, as ct. files: those that the recipe names, by their names in it; a recipe that is a file finds them
         next to itself. They and the recipe are sent as they are. title, project: of the case. on_progress: called with what is being done
         and the share of the whole, 0 to 1.

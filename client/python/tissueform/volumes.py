@@ -41,7 +41,8 @@ class Volume:
     voxel indices (i, j, k, 1) to mm; its axes may have any direction. coordinate_system: "LPS" (DICOM, ITK), or "RAS" (nibabel, 3D Slicer):
 
         image = nibabel.load("head.nii.gz")
-        volume = tissueform.Volume(image.get_fdata(), image.affine, "RAS")
+        volume = tissueform.Volume(image.get_fdata(), image.affine, "RAS")  # as tissueform.from_nibabel(image)
+        volume = tissueform.from_dicom("CT/")
     """
 
     values: npt.ArrayLike
@@ -154,8 +155,7 @@ def file_of(volume: Union[Volume, PathLike], what: str) -> Tuple[str, bytes]:
         return volume.to_file(what)
     path = pathlib.Path(volume)
     if path.is_dir():
-        raise InvalidInput(f"the {what} is a folder", advice="`tissueform plan build --server HOST:PORT --ct FOLDER` reads a DICOM series and "
-                           "sends no identifiers; or read it with a library and give a Volume")
+        raise InvalidInput(f"the {what} is a folder", advice="read a DICOM series with tissueform.from_dicom(folder), which needs pydicom")
     try:
         file = path.read_bytes()
     except OSError as error:

@@ -7,6 +7,7 @@ import json
 import pathlib
 import re
 import subprocess
+import sys
 import tempfile
 import unittest
 import unittest.mock
@@ -73,6 +74,20 @@ class PlanBuildTest(unittest.TestCase):
             self.assertEqual((self.folder / "there" / name).read_bytes(), (self.folder / "here" / name).read_bytes(), name)
         with self.assertRaises(InvalidInput):
             built.save(self.folder / "there")
+
+    def test_the_plan_of_a_dicom_series_is_that_of_the_command(self):
+        sys.path.insert(0, str(SOURCE / "deploy/pacs"))
+        from head_series import write_series
+        write_series(self.folder / "CT")
+        # The series' origin lies between its voxels, the recipe's planes are in the array's coordinates.
+        recipe = {key: value for key, value in RECIPE.items() if key != "region_of_interest"}
+        built = self.client.build_plan(tissueform.from_dicom(self.folder / "CT"), recipe)
+        built.save(self.folder / "there")
+        (self.folder / "recipe.json").write_text(json.dumps(recipe))
+        tissueform_command("plan", "build", "--ct", self.folder / "CT", "--recipe", self.folder / "recipe.json", "--out", self.folder / "here",
+                           "--no-pictures", "--accept-defects")
+        for name in ("plan.json", "head.vtu", "viewer.glb"):
+            self.assertEqual((self.folder / "there" / name).read_bytes(), (self.folder / "here" / name).read_bytes(), name)
         with self.assertRaises(NotFound):
             built.read("../record")
         built.delete()

@@ -80,7 +80,7 @@ class VolumeTest(unittest.TestCase):
         self.refused("last row", "correct", Volume(values, np.eye(3)))
         self.refused("flat voxels", "correct", Volume(values, np.diag([1.0, 1, 0, 1])))
         self.refused('is "LAS"', "RAS", Volume(values, affine, "LAS"))
-        self.refused("is a folder", "plan build --server", self.folder)
+        self.refused("is a folder", "from_dicom", self.folder)
         self.refused("cannot read", "check the name", self.folder / "none.nrrd", NotFound)
         for name, data, message in (("a.dcm", b"x", "is not a .nrrd"), ("a.nrrd", b"NRRD0005\ndata file: b\n\n", "a file of their own"),
                                     ("b.nrrd", b"x", "damaged"), ("a.mha", b"x", "damaged"), ("a.nii", b"x" * 400, "damaged"),
