@@ -12,6 +12,7 @@ peers and series that must be refused. Prints a line for each; exit code 1 when 
 
 import concurrent.futures
 import datetime
+import os
 import pathlib
 import re
 import shutil
@@ -44,6 +45,8 @@ BUILD_S = 240
 OBJECTS = 6
 # What the bridge may have resident.
 MOST_MIB = 200
+# A sanitizer's own memory hides the program's.
+IS_SANITIZED = any(name.endswith("SAN_OPTIONS") for name in os.environ)
 PLANTED = {"name": "Planted^Patricia", "patient_id": "PLANTED-4711", "born": "19610203"}
 OTHER = {"name": "Another^Anton", "patient_id": "OTHER-0815", "born": "19550607"}
 WORDS = [b"Planted", b"Patricia", b"PLANTED-4711", b"19610203", b"Another^Anton", b"OTHER-0815", b"19550607"]
@@ -269,7 +272,8 @@ def run(programs):
     print(f"     word to stored: {time.monotonic() - confirmed:.1f} s", flush=True)
     most_mib = stack.most_memory_mib(programs.running["bridge"].pid)
     print(f"     the bridge had at most {most_mib:.0f} MiB")
-    check("the bridge keeps within its memory", most_mib < MOST_MIB, f"{most_mib:.0f} MiB")
+    if not IS_SANITIZED:
+        check("the bridge keeps within its memory", most_mib < MOST_MIB, f"{most_mib:.0f} MiB")
     returned_objects.check_objects(check, programs, study, programs.folder / "ct", written.end())
     check_refusals(programs)
 

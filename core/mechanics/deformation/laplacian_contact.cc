@@ -91,6 +91,9 @@ absl::Status LaplacianContact::Eliminate(const Eigen::MatrixXd& of_rows) {
   if (!bilateral_.empty()) {
     held_factor_.compute(of_rows(bilateral_, bilateral_));
     const Eigen::MatrixXd coupling = of_rows(bilateral_, unilateral_);
+    held_to_free_ = coupling;
+    // Eigen solves nothing for no right-hand side by reading from a null pointer.
+    if (unilateral_.empty()) return absl::OkStatus();
     held_to_free_ = held_factor_.solve(coupling);
     compliance_ -= coupling.transpose() * held_to_free_;
     compliance_ = (0.5 * (compliance_ + compliance_.transpose())).eval();

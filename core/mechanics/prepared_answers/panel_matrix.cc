@@ -74,6 +74,7 @@ template <InstructionSet kSet, int kFactors, int kPanels, bool kIsFull>
 inline __attribute__((always_inline)) void AddColumns(
     const Operands& of, size_t panel, int first_register, size_t begin, size_t end,
     typename Block<kSet, kFactors>::Sums (&sums)[kPanels][Block<kSet, kFactors>::kRegisters]) {
+  if (begin == end) return;  // of.lower may be null
   constexpr int kLanes = Register<kSet>::kLanes;
   const int32_t* const upper = of.upper + panel * of.cols * kPairs + first_register * kLanes;
   const int32_t* const lower =
