@@ -5,12 +5,14 @@
 
   time_python_drag.py PROGRAMS PLAN    by a Python that has the package: BUILD/test_scratch/python_package/venv/bin/python
 
-Prints medians of the rounds in ms: from sending a pose to having its frame, how long prepared answers take to evaluate in Python, and how
+Prints medians of the rounds in ms: from sending a pose to having its frame, the same by grpcio alone (its call and the messages as bytes, a queue between, nothing of the
+package: the least that a Python client by grpcio can need), how long prepared answers take to evaluate in Python, and how
 long a frame of 100,000 vertices takes to decode. PLAN: with handles and fixed vertices by point_data.
 """
 
 import json
 import pathlib
+import queue
 import statistics
 import subprocess
 import sys
@@ -21,6 +23,7 @@ import meshio
 import numpy as np
 import tissueform
 from tissueform import Pose
+from tissueform.poses import poses_to_proto
 from tissueform.predictions import frame_of
 from tissueform.v1 import deform_service_pb2
 
@@ -38,6 +41,37 @@ def make_session(client, plan, folder):
     return client.create_session(uploaded, fixed=vertices_of(plan["fixed"], mesh), handles=handles, model="linear_elastic")
 
 
+def pose_of(session, i):
+    return {session.handles[0]: Pose(translation_mm=(0, 0.02 * (i % 100), 0))}
+
+
+def message_of(**message):
+    return deform_service_pb2.DeformRequest(**message).SerializeToString()
+
+
+def grpcio_ms(session, rate):
+    """The frames of the same poses; what is sent is made before, and what comes is not read."""
+    with session.drag(vertices="skin", prepared=True) as drag:
+        configuration = drag._configuration
+    sent = [(message_of(pose=deform_service_pb2.PoseUpdate(sequence=i + 1, poses=poses_to_proto(pose_of(session, i), session.handles))),
+             message_of(ack=deform_service_pb2.FrameAck(sequence=i + 1))) for i in range(SECONDS * rate)]
+    requests = queue.SimpleQueue()
+    requests.put(message_of(configuration=configuration))
+    answers = session._caller.channel.stream_stream("/tissueform.v1.DeformService/Deform")(iter(requests.get, None))
+    next(answers)
+    times = []
+    begin = time.perf_counter()
+    for i, (update, acknowledgment) in enumerate(sent):
+        time.sleep(max(0, begin + i / rate - time.perf_counter()))
+        start = time.perf_counter()
+        requests.put(update)
+        next(answers)
+        requests.put(acknowledgment)
+        times.append(1000 * (time.perf_counter() - start))
+    requests.put(None)
+    return statistics.median(times)
+
+
 def python_ms(session, rate):
     times = []
     with session.drag(vertices="skin", prepared=True) as drag:
@@ -46,7 +80,7 @@ def python_ms(session, rate):
         for i in range(SECONDS * rate):
             time.sleep(max(0, begin + i / rate - time.perf_counter()))
             start = time.perf_counter()
-            drag.move({session.handles[0]: Pose(translation_mm=(0, 0.02 * (i % 100), 0))})
+            drag.move(pose_of(session, i))
             times.append(1000 * (time.perf_counter() - start))
     return statistics.median(times)
 
@@ -78,9 +112,9 @@ def main():
     with tissueform.local(programs / "tissueform-server") as server, server.connect() as client, tempfile.TemporaryDirectory() as folder:
         with make_session(client, plan, path.parent) as session:
             for rate in RATES:
-                rounds = [(python_ms(session, rate), command_ms(programs, path, server.address, folder, rate)) for _ in range(ROUNDS)]
-                python, command = (statistics.median(times) for times in zip(*rounds))
-                print(f"{rate} poses/s: Python {python:.2f} ms, C++ {command:.2f} ms, ratio {python / command:.2f}")
+                rounds = [(python_ms(session, rate), grpcio_ms(session, rate), command_ms(programs, path, server.address, folder, rate)) for _ in range(ROUNDS)]
+                python, bare, command = (statistics.median(times) for times in zip(*rounds))
+                print(f"{rate} poses/s: Python {python:.2f} ms, grpcio alone {bare:.2f} ms, C++ {command:.2f} ms, ratios to C++ {python / command:.2f} and {bare / command:.2f}")
             answers = session.prepared_answers(vertices="skin")
             pose = {session.handles[0]: Pose(translation_mm=(0, 2, 0))}
             print(f"prepared answers of the skin, evaluated here: {median_ms(lambda: answers.evaluate(pose)):.2f} ms")
