@@ -15,6 +15,8 @@ strict = True
 python_version = 3.9
 [mypy-slicer.*,vtk.*,grpc.*,google.*,meshio.*,pyvista.*,vtkmodules.*]
 ignore_missing_imports = True
+[mypy-pydicom.*,pkg_resources.*]
+follow_imports = skip
 [mypy-tissueform.v1.*]
 ignore_errors = True
 """
