@@ -183,6 +183,8 @@ describe("a whole head", () => {
     await edit(page, "B");
     await page.getByRole("textbox", { name: /^Forward/ }).waitFor();
     await page.locator(".side-by-side").getByRole("button", { name: "Reset", exact: true }).click();
+    // The fields follow with the next picture, over what was typed before it.
+    await expect.poll(() => page.getByRole("textbox", { name: /^Forward/ }).inputValue()).toBe("0.0");
     await typeMove(page, "Forward", "5");
     await typeMove(page, "Pitch", "2");
     await answered(page);
