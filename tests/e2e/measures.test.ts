@@ -257,3 +257,29 @@ describe("the bundled head", () => {
     expect(faults).toEqual([]);
   });
 });
+
+test("a clinic's deviations reach the intervals through its gateway, of an operation on request", async () => {
+  const path = join(planner.folder, "deviations.json");
+  const surgery = { translation_mm: [0, 0, 0], rotation_deg: [0, 0, 0] };
+  writeFileSync(path, JSON.stringify({ source: "our clinic", surgery, model_mm: { default: 1 }, operations: { bsso: { surgery: { translation_mm: [0, 2, 0] } } } }));
+  const clinic = await Planner.start(undefined, { gateway: ["--deviations", path] });
+  try {
+    const { page, faults } = await openCase(await clinic.browse(), clinic, clinic.packWholeHead());
+    await page.getByText("Linear elastic", { exact: true }).click();
+    await page.waitForFunction(() => (globalThis as unknown as Hook).tissueform.bench.localState.value.kind === "ready");
+    await takeSegment(page, "Lower jaw");
+    await typeMove(page, "Forward", "5");
+    await page.getByText("if surgery and model err as our clinic,").waitFor();
+    const incisor = page.locator(".movements tr", { hasText: "Lower incisor" });
+    expect(await incisor.innerText()).toMatch(/of this surgery 0\.0/);
+    await page.getByLabel("Intervals of").selectOption("bsso");
+    await page.getByText("if surgery and model err as our clinic, bsso,").waitFor();
+    // 1.96 of the 2 mm forward and back.
+    await incisor.getByText("of this surgery 3.9").waitFor();
+    expect(await incisor.innerText()).toMatch(/± 3\.9/);
+    expect(await seriousFindings(page)).toEqual([]);
+    expect(faults).toEqual([]);
+  } finally {
+    await clinic.stop();
+  }
+});

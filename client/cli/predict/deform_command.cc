@@ -3,11 +3,13 @@
 
 #include "client/cli/predict/deform_command.h"
 
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
 #include "client/cli/shared/option_checks.h"
 #include "client/cli/shared/result_writer.h"
@@ -109,11 +111,22 @@ absl::StatusOr<Positions> Predict(const PlanProblem& problem, const Deviations& 
   return std::move(deformation.positions);
 }
 
+// They would go unused without a word.
+void WarnOfUnusedDeviations(const DeformOptions& options, const Plan& plan) {
+  const bool are_given = !options.deviations.empty() || !options.operation.empty();
+  if (!are_given || TraitsOf(plan.model).is_elastic) return;
+  absl::FPrintF(stderr,
+                "warning: --deviations and --operation change nothing: %s has no intervals; "
+                "linear_elastic and neo_hookean have\n",
+                ModelName(plan.model));
+}
+
 absl::Status RunDeform(const DeformOptions& options) {
   TF_RETURN_IF_ERROR(CheckOutputs(options));
   TF_ASSIGN_OR_RETURN(const Plan plan, ReadChosenPlan(options));
   TF_RETURN_IF_ERROR(CheckSeal(options.plan, options.reading.resolve, plan));
   TF_ASSIGN_OR_RETURN(const Deviations deviations, ChosenDeviations(options));
+  WarnOfUnusedDeviations(options, plan);
   double read_seconds = 0;
   TF_ASSIGN_OR_RETURN(PlanProblem problem,
                       ResolveWithProgress(plan, options.reading.resolve, &read_seconds));

@@ -45,13 +45,14 @@ export function movementsPanel(bench: Workbench): HTMLElement {
     });
   };
   const rest = new Rest();
+  let hasChoice = false;
   const show = () => {
     rest.over();
     const atOnce = bench.answersAtOnce && landmarks.length > 0;
     if (!atOnce || !rest.isQuick) draw(null);
     if (bench.showsPlan && landmarks.length > 0) rest.begin(() => movementBandsAtRest(bench, bench.planAnswers), (whole) => {
       draw(whole);
-      if (whole !== null) void import("./operation_choice").then(({ showOperationChoice }) => showOperationChoice(bench, table));
+      if (whole !== null && !hasChoice) void import("./operation_choice").then(({ showOperationChoice }) => showOperationChoice(bench, table)).then(() => (hasChoice = true));
     }, atOnce);
   };
   bench.shown.watch(throttleToFrame(show));

@@ -57,7 +57,7 @@ test.each([
   ["another number of axes", { ...TABLE, surgery: { translation_mm: [1], rotation_deg: [0, 0, 0] } }],
   ["a negative number", { ...TABLE, model_mm: { default: -1 } }],
   ["no default", { ...TABLE, model_mm: { chin: 1 } }],
-  ["an operation that is none", { ...TABLE, operations: { bsso: 1 } }],
+  ["an operation that is no object", { ...TABLE, operations: { bsso: 1 } }],
 ])("%s is refused, never taken for published", async (_, deviations) => {
   const { deviationTable } = await pageOf(() => Response.json({ deviations }));
   await expect(deviationTable()).rejects.toThrow("the gateway's deviations cannot be read");

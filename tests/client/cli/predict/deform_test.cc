@@ -485,6 +485,9 @@ TEST_F(DeformTest, TheWholeBandNamesItsPartsAndTakesAClinicsFigures) {
   // Published of one operation: 0.9 mm of mean absolute distance.
   EXPECT_NEAR(place_of({"--operation", "bsso_forward"}, "nose")["model_mm"],
               1.96 * 0.9 / std::sqrt(2 / std::numbers::pi), 0.05);
+  const ProcessResult unused =
+      Run({"deform", plan, "--out", "b.vtu", "--model", "arap", "--operation", "bsso_forward"});
+  EXPECT_THAT(unused.err, HasSubstr("change nothing: arap has no intervals"));
   const ProcessResult unknown =
       Run({"deform", plan, "--out", "a.vtu", "--deviations", "own.json", "--operation", "lefort"});
   EXPECT_NE(unknown.exit_code, 0);
