@@ -67,6 +67,7 @@ TEST_P(EvaluatedModelTest, ChosenVerticesAreWhereTheWholeAnswerHasThem) {
   ASSERT_TRUE(evaluator.Answer(poses, &positions));
   const auto count = static_cast<int32_t>(positions.size() / 3);
   std::vector<int32_t> vertices;  // of all kinds, not in their order, one of them twice
+  vertices.reserve(static_cast<size_t>(count) + 1);
   for (int32_t v = 0; v < count; ++v) vertices.push_back((v * 7 + 3) % count);
   vertices.push_back(vertices[0]);
   const std::vector<ChosenVertex> chosen = evaluator.Choose(vertices);
