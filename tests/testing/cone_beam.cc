@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <random>
 
 namespace tissueform::testing {
@@ -37,21 +36,6 @@ CtVolume ConeBeamOf(const CtVolume& helical, const ConeBeam& beam) {
     }
   }
   return cone;
-}
-
-void WriteNrrd(const CtVolume& volume, const std::string& path) {
-  std::ofstream stream(path, std::ios::binary);
-  const auto vector = [](const Eigen::Vector3d& v) {
-    return "(" + std::to_string(v.x()) + "," + std::to_string(v.y()) + "," + std::to_string(v.z()) +
-           ")";
-  };
-  stream << "NRRD0004\ntype: int16\ndimension: 3\nspace: left-posterior-superior\nsizes:";
-  for (const int size : volume.size) stream << " " << size;
-  stream << "\nspace directions:";
-  for (int axis = 0; axis < 3; ++axis) stream << " " << vector(volume.StepsMm().col(axis));
-  stream << "\nspace origin: " << vector(volume.origin_mm) << "\nencoding: raw\nendian: little\n\n";
-  stream.write(reinterpret_cast<const char*>(volume.hu.data()),
-               static_cast<std::streamsize>(volume.hu.size() * sizeof(int16_t)));
 }
 
 }  // namespace tissueform::testing

@@ -32,6 +32,4 @@ struct ConeBeam {
 CtVolume ConeBeamOf(const CtVolume& helical, const ConeBeam& beam);
 
 // As a NRRD file in LPS.
-void WriteNrrd(const CtVolume& volume, const std::string& path);
-
 }  // namespace tissueform::testing

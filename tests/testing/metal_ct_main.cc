@@ -15,6 +15,7 @@
 #include "core/base/parallel_for.h"
 #include "core/base/status_macros.h"
 #include "tests/testing/metal_phantom.h"
+#include "tests/testing/nrrd_file.h"
 
 namespace {
 

@@ -237,30 +237,48 @@ bool HasMetal(const MetalLayers& layers) {
                      [](const auto& cells) { return !cells.empty(); });
 }
 
-// One slice of all three heads. Without metal in it, a head's slice is that of the free one.
+// One slice of a volume as a scanner sees it, with metal or without.
+class ScannedSlice {
+ public:
+  ScannedSlice(const CtScanner& scanner, const CtVolume& volume, int k)
+      : scanner_(scanner),
+        size_(volume.size[0]),
+        pixel_mm_(volume.spacing_mm.x()),
+        first_(static_cast<size_t>(k) * static_cast<size_t>(size_ * size_)),
+        seed_(static_cast<uint32_t>(k)),
+        tissue_(TissueOfHu(&volume.hu[first_], size_, pixel_mm_)),
+        lengths_(scanner.ProjectTissue(tissue_)),
+        free_(scanner.Transmission(lengths_)) {}
+
+  // `layers` of metal may be empty.
+  void Write(const MetalWork& work, const MetalLayers& layers, CtVolume* volume,
+             uint32_t other_noise = 0) const {
+    const Eigen::ArrayXXf seen =
+        layers.empty() ? free_ : scanner_.WithMetal(free_, tissue_, lengths_, work.metal, layers);
+    const std::vector<int16_t> hu =
+        scanner_.Reconstruct(scanner_.Measure(seen, seed_ + other_noise), size_, pixel_mm_);
+    std::copy(hu.begin(), hu.end(), volume->hu.begin() + static_cast<std::ptrdiff_t>(first_));
+  }
+
+ private:
+  const CtScanner& scanner_;
+  int size_;
+  double pixel_mm_;
+  size_t first_;
+  uint32_t seed_;
+  TissueSlice tissue_;
+  TissueLengths lengths_;
+  Eigen::ArrayXXf free_;
+};
+
+// One slice of all heads. Without metal in it, a head's slice is that of the free one.
 void ScanSlice(const CtScanner& scanner, const CtVolume& fine, int k, SimulatedHeads* heads) {
-  const int size = fine.size[0];
-  const double pixel_mm = fine.spacing_mm.x();
-  const size_t first = static_cast<size_t>(k) * static_cast<size_t>(size * size);
-  const TissueSlice tissue = TissueOfHu(&fine.hu[first], size, pixel_mm);
-  const TissueLengths lengths = scanner.ProjectTissue(tissue);
-  const Eigen::ArrayXXf free = scanner.Transmission(lengths);
-  const auto seed = static_cast<uint32_t>(k);
-  const auto scan = [&](const Eigen::ArrayXXf& transmission, uint32_t of_noise) {
-    return scanner.Reconstruct(scanner.Measure(transmission, of_noise), size, pixel_mm);
-  };
-  const auto write = [first](const std::vector<int16_t>& hu, CtVolume* head) {
-    std::copy(hu.begin(), hu.end(), head->hu.begin() + static_cast<std::ptrdiff_t>(first));
-  };
-  const std::vector<int16_t> without = scan(free, seed);
-  write(without, &heads->free);
-  write(scan(free, seed + kOtherNoise), &heads->again);
+  const ScannedSlice slice(scanner, fine, k);
+  slice.Write({}, {}, &heads->free);
+  slice.Write({}, {}, &heads->again, kOtherNoise);
   for (const auto& [work, head] :
        {std::pair(Fillings(), &heads->fillings), std::pair(Braces(), &heads->braces)}) {
-    const MetalLayers layers = LayersOf(work, fine, k);
-    write(layers.empty() ? without
-                         : scan(scanner.WithMetal(free, tissue, lengths, work.metal, layers), seed),
-          head);
+    slice.Write(work, LayersOf(work, fine, k), head);
   }
 }
 
@@ -351,23 +369,15 @@ absl::StatusOr<SimulatedHeads> SimulateHeads(int threads, const std::vector<int>
   return heads;
 }
 
-absl::Status WriteNrrd(const std::string& path, const CtVolume& volume) {
-  std::ofstream file(path, std::ios::binary);
-  file << "NRRD0004\ntype: int16\ndimension: 3\nspace: left-posterior-superior\nsizes: "
-       << absl::StrFormat("%d %d %d\nspace directions:", volume.size[0], volume.size[1],
-                          volume.size[2]);
-  const Eigen::Matrix3d steps = volume.StepsMm();
-  for (int axis = 0; axis < 3; ++axis) {
-    file << absl::StrFormat(" (%.9g,%.9g,%.9g)", steps(0, axis), steps(1, axis), steps(2, axis));
-  }
-  file << absl::StrFormat("\nspace origin: (%.9g,%.9g,%.9g)\n", volume.origin_mm.x(),
-                          volume.origin_mm.y(), volume.origin_mm.z())
-       << "kinds: domain domain domain\nendian: little\nencoding: raw\n\n";
-  file.write(reinterpret_cast<const char*>(volume.hu.data()),
-             static_cast<std::streamsize>(volume.hu.size() * sizeof(int16_t)));
-  file.close();
-  if (!file) return absl::UnavailableError(absl::StrCat("cannot write \"", path, "\""));
-  return absl::OkStatus();
+void ScanWithMetal(const MetalWork& work, int threads, CtVolume* volume) {
+  const CtScanner scanner;
+  ParallelFor(threads, volume->size[2], 1, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index k = begin; k < end; ++k) {
+      const MetalLayers layers = LayersOf(work, *volume, static_cast<int>(k));
+      if (layers.empty()) continue;
+      ScannedSlice(scanner, *volume, static_cast<int>(k)).Write(work, layers, volume);
+    }
+  });
 }
 
 }  // namespace tissueform::testing

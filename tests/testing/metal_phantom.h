@@ -57,7 +57,8 @@ struct SimulatedHeads {
 // empty, the slices with metal. About 10 s on one core; the result does not depend on the threads.
 absl::StatusOr<SimulatedHeads> SimulateHeads(int threads, const std::vector<int>& only = {});
 
-// As NRRD with its place in the patient, values in HU.
-absl::Status WriteNrrd(const std::string& path, const CtVolume& volume);
+// Puts metal into a volume with square slices: those that hold some are scanned, the others stay.
+// Does not depend on `threads`.
+void ScanWithMetal(const MetalWork& work, int threads, CtVolume* volume);
 
 }  // namespace tissueform::testing

@@ -130,10 +130,11 @@ std::vector<int32_t> PlacesOf(const TriangleMesh& surface, const SurfaceParts& p
   return places;
 }
 
-// Which parts are the outermost wall of the largest volume or a cavity of it. Cavities from the
-// largest down, so that one that floats inside another is recognised.
+// Which parts are the outermost wall of the largest volume, of another that is large enough, or a
+// cavity of one of them. Cavities from the largest down, so that one that floats inside another is
+// recognised.
 std::vector<bool> KeptParts(const TriangleMesh& surface, const SurfaceParts& parts,
-                            double min_cavity_volume_mm3) {
+                            const SurfaceExtractionOptions& options) {
   const std::vector<double>& volumes = parts.volumes_mm3;
   const std::vector<int32_t> places = PlacesOf(surface, parts);
   std::vector<int32_t> order(volumes.size());
@@ -141,9 +142,10 @@ std::vector<bool> KeptParts(const TriangleMesh& surface, const SurfaceParts& par
   std::stable_sort(order.begin(), order.end(),
                    [&](int32_t a, int32_t b) { return volumes[a] < volumes[b]; });
   std::vector<bool> kept(volumes.size());
+  for (const int32_t part : order) kept[part] = volumes[part] >= options.min_part_volume_mm3;
   kept[order.back()] = true;
   for (const int32_t part : order) {
-    if (volumes[part] >= 0 || -volumes[part] < min_cavity_volume_mm3) break;
+    if (volumes[part] >= 0 || -volumes[part] < options.min_cavity_volume_mm3) break;
     const Vector3d place = surface.positions().row(places[part]).transpose();
     kept[part] = WindingNumber(surface, parts, kept, place) > 0.5;
   }
@@ -158,7 +160,7 @@ absl::StatusOr<TriangleMesh> ExtractSurface(const VoxelGrid<float>& grid,
   VoxelGrid<float> heights = Padded(grid, options.level, Clearance(grid, options));
   const TriangleMesh surface = ZeroSurface(&heights);
   const SurfaceParts parts = FindSurfaceParts(surface);
-  return KeepParts(surface, parts, KeptParts(surface, parts, options.min_cavity_volume_mm3));
+  return KeepParts(surface, parts, KeptParts(surface, parts, options));
 }
 
 }  // namespace tissueform

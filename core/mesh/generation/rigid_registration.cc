@@ -29,8 +29,13 @@ constexpr double kTangentWeight = 1e-3;
 // An angle counts as the way of a point so far from the axis.
 constexpr double kArmMm = 100;
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
+// Of the distance by which the target stands out, beside all points' weights, and what it may be.
+constexpr double kStandsOutPrior = 1e-2;
+constexpr double kMostStandsOutMm = 1.5;
+
+// A turn, a translation, and the distance by which the target stands out.
+using Matrix7 = Eigen::Matrix<double, 7, 7>;
+using Vector7 = Eigen::Matrix<double, 7, 1>;
 
 struct Pairs {
   Positions from;  // moved points
@@ -40,18 +45,24 @@ struct Pairs {
   Eigen::VectorXd weights;
 };
 
-void AddRow(const Eigen::Vector3d& at, const Eigen::Vector3d& direction, double residual,
-            double weight, Matrix6* normal_matrix, Vector6* right) {
-  Vector6 row;
-  row << at.cross(direction), direction;
+struct Place {
+  RigidMove move;
+  double stands_out_mm = 0;
+};
+
+void AddRow(const Eigen::Vector3d& at, const Eigen::Vector3d& direction, double outward,
+            double residual, double weight, Matrix7* normal_matrix, Vector7* right) {
+  Vector7 row;
+  row << at.cross(direction), direction, outward;
   *normal_matrix += weight * row * row.transpose();
   *right -= weight * residual * row;
 }
 
-// One Gauss-Newton step towards the planes of the nearest points.
-RigidMove StepToPlanes(const Pairs& pairs) {
-  Matrix6 normal_matrix = Matrix6::Zero();
-  Vector6 right = Vector6::Zero();
+// One Gauss-Newton step towards the planes of the nearest points, which lie `now` mm within the
+// target, and to what distance within it they should lie.
+Place StepToPlanes(const Pairs& pairs, const RegistrationOptions& options, double now) {
+  Matrix7 normal_matrix = Matrix7::Zero();
+  Vector7 right = Vector7::Zero();
   const Eigen::RowVector3d center = pairs.from.colwise().mean();
   for (Eigen::Index i = 0; i < pairs.from.rows(); ++i) {
     const double weight = pairs.weights[i];
@@ -59,20 +70,29 @@ RigidMove StepToPlanes(const Pairs& pairs) {
     const Eigen::Vector3d at = pairs.from.row(i) - center;
     const Eigen::Vector3d gap = pairs.from.row(i) - pairs.to.points.row(i);
     const Eigen::Vector3d normal = pairs.to.normals.row(i);
-    AddRow(at, normal, gap.dot(normal), weight, &normal_matrix, &right);
+    AddRow(at, normal, 1, gap.dot(normal), weight, &normal_matrix, &right);
     for (int axis = 0; axis < 3; ++axis) {
-      AddRow(at, Eigen::Vector3d::Unit(axis), gap[axis], kTangentWeight * weight, &normal_matrix,
+      AddRow(at, Eigen::Vector3d::Unit(axis), 0, gap[axis], kTangentWeight * weight, &normal_matrix,
              &right);
     }
   }
-  const Vector6 step = normal_matrix.ldlt().solve(right);
+  Vector7 step = Vector7::Zero();
+  if (options.target_stands_out) {
+    const double prior = kStandsOutPrior * pairs.weights.sum();
+    normal_matrix(6, 6) += prior;
+    right[6] -= prior * now;
+    step = normal_matrix.ldlt().solve(right);
+  } else {
+    step.head<6>() = normal_matrix.topLeftCorner<6, 6>().ldlt().solve(right.head<6>());
+  }
   const Eigen::Vector3d turn = step.head<3>();
   RigidMove move;
   if (turn.norm() > 0) {
     move.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
   }
-  move.translation_mm = center.transpose() + step.tail<3>() - move.rotation * center.transpose();
-  return move;
+  move.translation_mm =
+      center.transpose() + step.segment<3>(3) - move.rotation * center.transpose();
+  return {move, std::clamp(now + step[6], -kMostStandsOutMm, kMostStandsOutMm)};
 }
 
 // The largest distance that counts: that of the share to keep, among the points that face alike.
@@ -115,16 +135,17 @@ void Weigh(const RegistrationOptions& options, bool by_distance, Pairs* pairs) {
   if (pairs->weights.maxCoeff() <= 0) pairs->weights.setOnes();
 }
 
-Pairs Paired(const NearestPoints& nearest, const OrientedPoints& points, const RigidMove& move,
+Pairs Paired(const NearestPoints& nearest, const OrientedPoints& points, const Place& place,
              const RegistrationOptions& options) {
-  Pairs pairs{.from = Moved(points.points, move),
+  Pairs pairs{.from = Moved(points.points, place.move),
               .to = {},
               .distances = {},
               .faces_alike = {},
               .weights = {}};
   pairs.to = nearest.WithNormals(pairs.from);
+  pairs.to.points -= place.stands_out_mm * pairs.to.normals;
   pairs.distances = (pairs.from - pairs.to.points).rowwise().norm();
-  const Positions normals = points.normals * move.rotation.transpose();
+  const Positions normals = points.normals * place.move.rotation.transpose();
   for (Eigen::Index i = 0; i < normals.rows(); ++i) {
     pairs.faces_alike.push_back(!options.compare_normals ||
                                 normals.row(i).dot(pairs.to.normals.row(i)) > kLeastCosine);
@@ -141,13 +162,14 @@ double ScoreOf(const Pairs& pairs) {
   return sum / static_cast<double>(pairs.distances.size());
 }
 
-Registration Measured(const Pairs& pairs, const RigidMove& move) {
+Registration Measured(const Pairs& pairs, const Place& place) {
   const Eigen::ArrayXd used = (pairs.weights.array() > 0).cast<double>();
   const Eigen::ArrayXd squares = pairs.distances.array().square();
-  return {.move = move,
+  return {.move = place.move,
           .rms_mm = std::sqrt((used * squares).sum() / std::max(1.0, used.sum())),
           .all_rms_mm = std::sqrt(squares.mean()),
           .share = used.mean(),
+          .stands_out_mm = place.stands_out_mm,
           .score_mm = ScoreOf(pairs)};
 }
 
@@ -181,23 +203,26 @@ SurfaceRegistration::SurfaceRegistration(const TriangleMesh& target) : nearest_(
 
 Registration SurfaceRegistration::Refine(const OrientedPoints& points, const RigidMove& start,
                                          const RegistrationOptions& options) const {
-  RigidMove move = start;
+  Place place{.move = start};
   const bool robust = options.compare_normals;
   for (int round = 0; round < options.max_rounds; ++round) {
-    Pairs pairs = Paired(nearest_, points, move, options);
+    Pairs pairs = Paired(nearest_, points, place, options);
     const bool to_planes = round >= kPointRounds;
     const bool by_distance = robust && round >= kEvenRounds;
     Weigh(options, by_distance, &pairs);
-    const RigidMove step =
-        to_planes ? StepToPlanes(pairs) : MoveOnto(pairs.from, pairs.to.points, pairs.weights);
+    const double before = place.stands_out_mm;
+    const Place step = to_planes
+                           ? StepToPlanes(pairs, options, before)
+                           : Place{MoveOnto(pairs.from, pairs.to.points, pairs.weights), before};
     const Eigen::Vector3d center = pairs.from.colwise().mean();
-    move = Composed(step, move);
-    move.rotation = NearestRotation(move.rotation);
-    if (to_planes && by_distance == robust && WayOf(step, center) < kRestMm) break;
+    place = {Composed(step.move, place.move), step.stands_out_mm};
+    place.move.rotation = NearestRotation(place.move.rotation);
+    const double way = WayOf(step.move, center) + std::abs(place.stands_out_mm - before);
+    if (to_planes && by_distance == robust && way < kRestMm) break;
   }
-  Pairs pairs = Paired(nearest_, points, move, options);
+  Pairs pairs = Paired(nearest_, points, place, options);
   Weigh(options, robust, &pairs);
-  return Measured(pairs, move);
+  return Measured(pairs, place);
 }
 
 }  // namespace tissueform

@@ -26,14 +26,19 @@ struct RegistrationOptions {
   double keep = 1;
   // Points whose nearest point of the target faces otherwise are not used.
   bool compare_normals = true;
+  // The target may stand out from the true surface by one distance everywhere, as bone does that
+  // was scanned with another kernel or cut at another threshold; the distance is found as well.
+  // Pulled a little towards 0, where the points do not tell it from a translation.
+  bool target_stands_out = false;
   int max_rounds = 120;
 };
 
 struct Registration {
   RigidMove move;
-  double rms_mm = 0;      // of the points that were used, from the target
-  double all_rms_mm = 0;  // of all points
-  double share = 0;       // of the points that were used, in [0, 1]
+  double rms_mm = 0;         // of the points that were used, from the target
+  double all_rms_mm = 0;     // of all points
+  double share = 0;          // of the points that were used, in [0, 1]
+  double stands_out_mm = 0;  // RegistrationOptions::target_stands_out; distances are without it
   // Mean distance of all points, each counted with at most 10 mm, and with 10 mm where it faces
   // otherwise: what distinguishes a wrong start from a right one.
   double score_mm = 0;

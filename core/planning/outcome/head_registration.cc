@@ -140,7 +140,8 @@ absl::StatusOr<HeadRegistration> RegisterHead(const OrientedPoints& unmoved,
         "forehead), so the scans cannot be registered; use a plan of a larger field of view");
   }
   const Registration start = Search(unmoved, post);
-  const Registration found = SurfaceRegistration(post).Refine(unmoved, start.move, {.keep = kKeep});
+  const Registration found = SurfaceRegistration(post).Refine(
+      unmoved, start.move, {.keep = kKeep, .target_stands_out = is_bone});
   const absl::Status fit = CheckFit(found, is_bone);
   // A good fit needs no search for a better orientation.
   if (!fit.ok() || found.score_mm > 1) {

@@ -52,13 +52,28 @@ void SetDeviation(const HeadFrame& frame, SegmentMovement* segment) {
   segment->deviation_deg = AnglesFromRotationVector(deviation.rotation_vector, frame);
 }
 
-void Measure(const CaseFile& contents, const SurfaceRegistration& bone, SegmentMovement* segment) {
+// From the planned place, from rest, and from where it lies when it went astray with another
+// segment, as the chin does with the lower jaw of an opened mouth.
+std::vector<RigidMove> StartsOf(const SegmentMovement& segment,
+                                const std::vector<SegmentMovement>& others) {
+  const RigidMove planned = MoveOf(segment.planned);
+  std::vector<RigidMove> starts = {planned, RigidMove()};
+  for (const SegmentMovement& other : others) {
+    const RigidMove astray = Composed(MoveOf(other.real), Inverse(MoveOf(other.planned)));
+    if (other.measured) starts.push_back(Composed(astray, planned));
+  }
+  return starts;
+}
+
+void Measure(const CaseFile& contents, const SurfaceRegistration& bone,
+             const std::vector<SegmentMovement>& others, SegmentMovement* segment) {
   const OrientedPoints points = PointsOf(contents, segment->handle);
   if (points.points.rows() < 3) return;
   Registration best;
   best.score_mm = INFINITY;
-  for (const RigidMove& start : {MoveOf(segment->planned), RigidMove()}) {
-    const Registration found = bone.Refine(points, start, {.keep = kKeep});
+  for (const RigidMove& start : StartsOf(*segment, others)) {
+    const Registration found =
+        bone.Refine(points, start, {.keep = kKeep, .target_stands_out = true});
     if (found.score_mm < best.score_mm) best = found;
   }
   segment->real = PoseOf(best.move, segment->planned.pivot_mm);
@@ -85,7 +100,7 @@ std::vector<SegmentMovement> MeasureSegments(const CaseFile& contents, const Tri
     segment.handle = handle.name;
     segment.planned = planned;
     segment.real = planned;
-    if (registration) Measure(contents, *registration, &segment);
+    if (registration) Measure(contents, *registration, segments, &segment);
     SetDeviation(contents.head_frame, &segment);
     segments.push_back(std::move(segment));
   }

@@ -29,7 +29,8 @@ struct SegmentMovement {
 };
 
 // The movement of each segment of the case: its pre-operative piece with its teeth registered to
-// the post-operative bone, from its planned place and from rest; the better fit counts. `bone` lies
+// the post-operative bone, from its planned place, from rest, and from where the segments before it
+// were found; the best fit counts. `bone` lies
 // in the pre-operative coordinates (HeadRegistration::to_pre); without it the plan's poses are
 // used.
 std::vector<SegmentMovement> MeasureSegments(const CaseFile& contents, const TriangleMesh* bone);

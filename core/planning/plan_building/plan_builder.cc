@@ -15,6 +15,7 @@
 #include "core/imaging/anatomy/itk_filters.h"
 #include "core/imaging/anatomy/surface_extraction.h"
 #include "core/planning/plan_building/given_pieces.h"
+#include "core/planning/plan_building/resampled_ct.h"
 #include "core/planning/plan_building/surface_head.h"
 #include "core/planning/plan_building/surfaces_file.h"
 #include "core/planning/plan_building/trial_solve.h"
@@ -60,16 +61,6 @@ class Progress {
 
 // What the stages hand on, each made whole by one of them.
 
-struct ResampledCt {
-  CtProvenance provenance;
-  CtValuesReport values;
-  std::array<int, 3> size = {0, 0, 0};  // of the CT as it was read
-  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Zero();
-  std::string frame_uid;  // CtVolume::frame_uid
-  LabelGrid unscanned;    // core/imaging/ct/unscanned.h
-  CtWithMetal ct;
-};
-
 struct Anatomy {
   HeadSegmentation head;
   BoneParts parts;
@@ -108,32 +99,12 @@ struct Description {
   SkinDistance skin_distance;
 };
 
-// Gray values have thresholds of their own.
-Recipe WithThresholds(Recipe recipe, const CtValuesReport& values) {
-  if (!values.gray) return recipe;
-  recipe.segmentation.tissue_above_hu = values.tissue_above_hu;
-  recipe.segmentation.bone_above_hu = values.bone_above_hu;
-  return recipe;
-}
-
 absl::StatusOr<ResampledCt> ReadAndResample(const std::string& ct_path, const Recipe& recipe,
                                             int threads, Progress* progress) {
   progress->Begin("reading the CT", 0, 0.08);
-  TF_ASSIGN_OR_RETURN(CtVolume volume, ReadCtVolume(ct_path, recipe.ct));
-  TF_ASSIGN_OR_RETURN(CtValuesReport values, PrepareValues(recipe.ct, &volume));
-  progress->Begin("reducing metal artifacts, resampling", 0.08, 0.12);
-  ResampledCt result{.provenance = std::move(volume.provenance),
-                     .values = {},
-                     .size = volume.size,
-                     .spacing_mm = volume.spacing_mm,
-                     .frame_uid = volume.frame_uid,
-                     .unscanned = {},
-                     .ct = {}};
-  TF_ASSIGN_OR_RETURN(result.ct, ResampleWithoutStreaks(std::move(volume), recipe.spacing_mm,
-                                                        recipe.metal, threads));
-  result.unscanned = std::move(result.ct.unscanned);
-  result.values = std::move(values);
-  return result;
+  return ReadResampledCt(ct_path, recipe, threads, [progress] {
+    progress->Begin("reducing metal artifacts, resampling", 0.08, 0.12);
+  });
 }
 
 absl::StatusOr<Anatomy> WithFrame(HeadSegmentation head, BoneParts parts, Landmarks landmarks,

@@ -118,8 +118,9 @@ void ClearBorder(LabelGrid* mask) {
 // The CT's own surface where bone ends, which keeps teeth sharp, and a smooth one where a cut ends
 // it: the lesser of both heights, in mm, the second moved out by half a voxel so that it does not
 // come before the first where both are there.
-absl::StatusOr<TriangleMesh> BoneSurface(const HeadSegmentation& head, const LabelGrid& bone,
-                                         uint8_t label) {
+absl::StatusOr<TriangleMesh> BoneSurface(
+    const HeadSegmentation& head, const LabelGrid& bone, uint8_t label,
+    double min_part_volume_mm3 = std::numeric_limits<double>::infinity()) {
   LabelGrid mask = MaskWhere(bone, [label](uint8_t value) { return value == label; });
   ClearBorder(&mask);
   const VoxelBox box = Grown(BoundingBox(mask), 3, mask.geometry);
@@ -137,7 +138,8 @@ absl::StatusOr<TriangleMesh> BoneSurface(const HeadSegmentation& head, const Lab
   }
   return ExtractSurface(height, {.level = 0,
                                  .clearance = static_cast<float>(0.02 * voxel_mm),
-                                 .min_cavity_volume_mm3 = std::numeric_limits<double>::infinity()});
+                                 .min_cavity_volume_mm3 = std::numeric_limits<double>::infinity(),
+                                 .min_part_volume_mm3 = min_part_volume_mm3});
 }
 
 // Whether the CT ends there: the surface runs up to half a voxel outside its last centres.
@@ -221,7 +223,9 @@ absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources&
 absl::StatusOr<HeadShells> MakeHeadShells(const HeadSegmentation& head, double ct_voxel_mm) {
   TF_ASSIGN_OR_RETURN(const auto split, SkinAndEnd(head, OutsideAir(head), ct_voxel_mm));
   const LabelGrid bone = MaskWhere(head.bone, [](uint8_t value) { return value != 0; });
-  TF_ASSIGN_OR_RETURN(const TriangleMesh fine, BoneSurface(head, bone, 1));
+  // After an operation the jaws may touch the skull nowhere.
+  TF_ASSIGN_OR_RETURN(const TriangleMesh fine,
+                      BoneSurface(head, bone, 1, head.options.smallest_bone_mm3));
   TF_ASSIGN_OR_RETURN(TriangleMesh decimated, DecimateSurface(fine, kBoneTriangles));
   return HeadShells{.skin = *split[0], .bone = std::move(decimated)};
 }

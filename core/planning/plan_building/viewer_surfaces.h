@@ -39,7 +39,8 @@ struct ViewerSources {
 // there is no skin.
 absl::StatusOr<std::vector<CaseSurface>> MakeViewerSurfaces(const ViewerSources& sources);
 
-// Skin and bone of a head whose jaws are not separated: all that a scan shows. The skin is open
+// Skin and bone of a head whose jaws are not separated: all that a scan shows, whether it hangs
+// together or not. The skin is open
 // where the CT ends.
 struct HeadShells {
   TriangleMesh skin;

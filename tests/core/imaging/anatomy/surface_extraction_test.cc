@@ -93,6 +93,18 @@ TEST(SurfaceExtractionTest, OnlyTheLargestPartIsKept) {
   EXPECT_EQ(ValidateTriangleMesh(surface).num_components, 1);
 }
 
+TEST(SurfaceExtractionTest, LargeEnoughPartsAreKeptWhenAskedFor) {
+  SurfaceExtractionOptions options;
+  options.min_part_volume_mm3 = 30;  // one of the small balls has 34 mm3, the other 14
+  const Height balls =
+      Either(Ball({-5, 0, 0}, 3), Either(Ball({5, 0, 0}, 2), Ball({5, 6, 0}, 1.5)));
+  ASSERT_OK_AND_ASSIGN(const TriangleMesh surface, ExtractSurface(Sampled(balls), options));
+  const SurfaceReport report = ValidateTriangleMesh(surface);
+  ExpectClosed(report);
+  const double expected = BallVolume(3) + BallVolume(2);
+  EXPECT_NEAR(report.enclosed_volume_mm3, expected, 0.03 * expected);
+}
+
 TEST(SurfaceExtractionTest, LargeCavitiesStayAndSmallOnesAreFilled) {
   const Height ball =
       Without(Without(Ball(Vector3d::Zero(), 9), Ball({-4, 0, 0}, 3)), Ball({4, 0, 0}, 1.5));

@@ -98,6 +98,41 @@ TEST_P(RegistrationOfSeedTest, FindsAKnownMoveThoughAnEndHasMovedOtherwise) {
 INSTANTIATE_TEST_SUITE_P(Seeds, RegistrationOfSeedTest, ::testing::Range(1, 51),
                          [](const auto& seed) { return "Seed" + std::to_string(seed.param); });
 
+Positions OutwardOf(const TriangleMesh& mesh) {
+  Positions outward = Positions::Zero(mesh.num_vertices(), 3);
+  for (const auto& t : mesh.triangles().rowwise()) {
+    const Vector3d a = mesh.positions().row(t[0]);
+    const Vector3d b = mesh.positions().row(t[1]);
+    const Vector3d c = mesh.positions().row(t[2]);
+    for (const int32_t v : t) outward.row(v) += (b - a).cross(c - a);
+  }
+  return outward.rowwise().normalized();
+}
+
+// The front of a bone, seen again by a scanner that shows all of it 0.4 mm thicker: only a fit that
+// looks for the thickness does not take it for a way forward.
+TEST(RigidRegistrationTest, FindsByHowMuchTheTargetStandsOut) {
+  std::mt19937 random(11);
+  const RigidMove known = RandomMove(&random, 8, 8);
+  const TriangleMesh lump = Lump(48);
+  const Positions thicker = lump.positions() + 0.4 * OutwardOf(lump);
+  const TriangleMesh target = *TriangleMesh::Create(Moved(thicker, known), lump.triangles());
+  const OrientedPoints all = SampleTriangles(Lump(37), 3000);
+  std::vector<Eigen::Index> front;
+  for (Eigen::Index i = 0; i < all.points.rows(); ++i) {
+    if (all.points(i, 1) < 0) front.push_back(i);
+  }
+  const OrientedPoints points = {all.points(front, Eigen::all), all.normals(front, Eigen::all)};
+  const SurfaceRegistration registration(target);
+  const Registration thick = registration.Refine(points, RigidMove(), {.target_stands_out = true});
+  EXPECT_NEAR(thick.stands_out_mm, 0.4, 0.05);
+  EXPECT_LT(ErrorMm(thick.move, known), 0.05);
+  EXPECT_LT(thick.rms_mm, 0.1);
+  const Registration thin = registration.Refine(points, RigidMove(), {});
+  EXPECT_EQ(thin.stands_out_mm, 0);
+  EXPECT_GT(ErrorMm(thin.move, known), 0.2);
+}
+
 TEST(RigidRegistrationTest, ReportsWhatDoesNotFit) {
   const TriangleMesh lump = Lump(30);
   Positions wide = lump.positions();

@@ -8,8 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "gtest/gtest.h"
 #include <Eigen/Geometry>
 
+#include "core/mechanics/constraints/rigid_pose.h"
 #include "core/mechanics/deformation/create_deformer.h"
 #include "core/mesh/generation/surface_decimation.h"
 #include "core/planning/case_file/predicted_case.h"
@@ -82,9 +85,12 @@ Positions Operated(const PlanProblem& problem, const std::vector<HandlePose>& po
 }  // namespace
 
 PreOperativeHead BundledHead(const std::string& plan) {
-  const std::string folder = "plans/" + plan + "/";
-  PlanProblem problem = *ResolvePlan(*ReadPlan(TestDataPath(folder + "plan.json")));
-  const ViewerFile viewer = *ReadViewer(TestDataPath(folder + kViewerFile));
+  return HeadOfPlan(TestDataPath("plans/" + plan));
+}
+
+PreOperativeHead HeadOfPlan(const std::string& folder) {
+  PlanProblem problem = *ResolvePlan(*ReadPlan(absl::StrCat(folder, "/plan.json")));
+  const ViewerFile viewer = *ReadViewer(absl::StrCat(folder, "/", kViewerFile));
   CaseFile contents;
   contents.mesh.vertex_count = problem.mesh->num_vertices();
   contents.mesh.payload.assign(
@@ -114,6 +120,18 @@ RigidMove RandomMove(std::mt19937* random, double most_deg, double most_mm) {
   return {Eigen::AngleAxisd(angle, axis).toRotationMatrix(), most_mm * vector()};
 }
 
+std::vector<HandlePose> MissedPlan(const PreOperativeHead& pre, std::mt19937* random) {
+  std::vector<HandlePose> poses;
+  for (const CaseHandle& handle : pre.contents.handles) {
+    const HandlePose error = PoseOf(RandomMove(random, 1, 1), {0, 0, 0});
+    HandlePose pose = PoseOf(MoveOf(handle.pose), handle.pivot_mm);
+    pose.translation_mm += error.translation_mm;
+    pose.rotation_vector += error.rotation_vector;
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
 PostOperativeHead OperatedHead(const PreOperativeHead& pre, const std::vector<HandlePose>& poses,
                                const Simulation& simulation, std::mt19937* random) {
   std::map<std::string, HandlePose> by_name;
@@ -130,6 +148,31 @@ PostOperativeHead OperatedHead(const PreOperativeHead& pre, const std::vector<Ha
                                                   pre.contents.surfaces.front().triangles);
   return {.skin = Rescanned(skin, simulation, random),
           .bone = Rescanned(Joined(bones), simulation, random)};
+}
+
+void ExpectMovements(const Outcome& outcome, const std::vector<HandlePose>& real) {
+  ASSERT_EQ(outcome.segments.size(), real.size());
+  for (size_t s = 0; s < real.size(); ++s) {
+    const RigidMove wrong = Composed(MoveOf(outcome.segments[s].real), Inverse(MoveOf(real[s])));
+    const Vector3d pivot = real[s].pivot_mm;
+    EXPECT_LT((wrong(pivot) - pivot).norm(), 0.2) << outcome.segments[s].handle;
+    EXPECT_LT(TurnDegrees(wrong), 0.3) << outcome.segments[s].handle;
+  }
+}
+
+void ExpectErrorsByRegion(const Outcome& outcome, const TriangleMesh& true_skin) {
+  constexpr double kTrueErrorMm = 0.1;
+  const ComparedPrediction& predicted = outcome.predictions.front();
+  EXPECT_EQ(predicted.movement, "real");
+  const std::vector<RegionComparison> expected =
+      CompareFaces(predicted.face, SignedSurface(true_skin));
+  ASSERT_EQ(expected.size(), predicted.regions.size());
+  for (size_t r = 0; r < expected.size(); ++r) {
+    const DistanceStatistics& found = predicted.regions[r].predicted_to_real;
+    const DistanceStatistics& given = expected[r].predicted_to_real;
+    EXPECT_NEAR(found.mean_mm, given.mean_mm, kTrueErrorMm) << expected[r].region;
+    EXPECT_NEAR(found.mean_absolute_mm, given.mean_absolute_mm, kTrueErrorMm) << expected[r].region;
+  }
 }
 
 }  // namespace tissueform::testing

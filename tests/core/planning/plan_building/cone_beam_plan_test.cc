@@ -18,6 +18,7 @@
 #include "tests/core/planning/plan_building/plan_comparison.h"
 #include "tests/testing/cone_beam.h"
 #include "tests/testing/meshes.h"
+#include "tests/testing/nrrd_file.h"
 #include "tests/testing/status_matchers.h"
 #include "tests/testing/test_paths.h"
 #include "tests/testing/unpacked_archive.h"
@@ -44,7 +45,7 @@ ConeBeam AboutTheJaws(const Landmarks& landmarks, double radius_mm) {
 absl::StatusOr<PlanBuild> BuildCone(const CtVolume& helical, const ConeBeam& beam,
                                     const Recipe& recipe) {
   const std::string path = absl::StrCat(::testing::TempDir(), "/cone_beam.nrrd");
-  WriteNrrd(ConeBeamOf(helical, beam), path);
+  TF_RETURN_IF_ERROR(WriteNrrd(path, ConeBeamOf(helical, beam)));
   return BuildPlan(path, recipe, {kThreads, nullptr});
 }
 

@@ -22,6 +22,7 @@
 #include "core/mechanics/linear_solvers/blas_threads.h"
 #include "tests/core/planning/plan_building/plan_comparison.h"
 #include "tests/testing/metal_phantom.h"
+#include "tests/testing/nrrd_file.h"
 #include "tests/testing/status_matchers.h"
 
 namespace tissueform::testing {

@@ -18,6 +18,7 @@
 #include "core/mesh/skin_region.h"
 #include "core/planning/plan_building/plan_builder.h"
 #include "tests/testing/metal_phantom.h"
+#include "tests/testing/nrrd_file.h"
 #include "tests/testing/status_matchers.h"
 
 // A whole head in coarse slices, with fillings in two bands of slices whose streaks tear lips and
