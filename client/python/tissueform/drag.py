@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from ._calls import FAILOVER_SECONDS, Backoff, Caller, Metadata
 from .errors import Cancelled, ServerError, ServerUnavailable, TissueformError, error_of_call, is_transient
-from .poses import Poses, poses_to_proto
+from .poses import Poses, add_poses
 from .predictions import Frame, frame_of
 from .v1 import deform_service_pb2, deform_service_pb2_grpc
 
@@ -34,8 +34,8 @@ class _Requests(Iterator[Any]):
         self._token = caller.token.current()
         self._queue: "queue.SimpleQueue[Any]" = queue.SimpleQueue()
 
-    def put(self, **message: Any) -> None:
-        self._queue.put(deform_service_pb2.DeformRequest(**message))
+    def put(self, request: deform_service_pb2.DeformRequest) -> None:
+        self._queue.put(request)
 
     def close(self) -> None:
         self._queue.put(None)
@@ -67,7 +67,7 @@ class _Stream:
     def acknowledge(self) -> None:
         """The frame that was received last has been used."""
         if self.unacknowledged is not None:
-            self.requests.put(ack=self.unacknowledged)
+            self.requests.put(deform_service_pb2.DeformRequest(ack=self.unacknowledged))
             self.unacknowledged = None
 
     def end(self) -> None:
@@ -122,16 +122,20 @@ class Drag:
 
         Errors: InvalidInput. Whether they arrive is seen where frames are received.
         """
-        messages = poses_to_proto(poses, self._handles)
+        request = deform_service_pb2.DeformRequest()
+        update = request.pose
+        update.commit = commit
+        add_poses(update.poses, poses, self._handles)
         with self._lock:
             if self._closed:
                 raise Cancelled("the drag is closed: no poses can be sent", advice="open another drag")
             self._sequence += 1
-            self._newest = deform_service_pb2.PoseUpdate(sequence=self._sequence, poses=messages, commit=commit)
+            update.sequence = self._sequence
+            self._newest = update
             if commit:
-                self._uncommitted = self._newest
+                self._uncommitted = update
             if self._stream is not None:
-                self._stream.requests.put(pose=self._newest)
+                self._stream.requests.put(request)
             return self._sequence
 
     def move(self, poses: Poses, *, commit: bool = False, final: bool = False) -> Frame:
@@ -256,7 +260,7 @@ class Drag:
     def _open(self, patience: float) -> _Stream:
         def attempt(metadata: Metadata) -> Tuple[_Stream, Any]:
             requests = _Requests(self._caller)
-            requests.put(configuration=self._configuration)
+            requests.put(deform_service_pb2.DeformRequest(configuration=self._configuration))
             call = self._stub.Deform(requests, metadata=metadata)
             try:
                 first = next(call)
@@ -299,7 +303,7 @@ class Drag:
         with self._lock:
             self._stream = stream
             for pose in self._unanswered():
-                stream.requests.put(pose=pose)
+                stream.requests.put(deform_service_pb2.DeformRequest(pose=pose))
             if self._cancelled.is_set():
                 stream.end()
             elif self._closed:
