@@ -39,13 +39,13 @@ class CorpusTest : public ::testing::TestWithParam<Target> {
   }
 };
 
-TEST_P(CorpusTest, EveryInputIsSurvived) {
+TEST_P(CorpusTest, SurvivesEveryInput) {
   const std::vector<std::string> inputs = Inputs();
   EXPECT_GE(inputs.size(), 2U);
   for (const std::string& input : inputs) Run(input);
 }
 
-TEST_P(CorpusTest, EveryBeginningOfEveryInputIsSurvived) {
+TEST_P(CorpusTest, SurvivesEveryTruncatedInput) {
   for (const std::string& input : Inputs()) {
     for (size_t size = 0; size < input.size(); size += 1 + input.size() / 64) {
       Run(input.substr(0, size));

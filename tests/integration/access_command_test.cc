@@ -49,13 +49,13 @@ class AccessCommandTest : public ServedCliTest {
   std::unique_ptr<PlanSession> session_;
 };
 
-TEST_F(AccessCommandTest, WithoutLoginsOneIsNobodyByName) {
+TEST_F(AccessCommandTest, CallerIsUnnamedWithoutLogins) {
   const ProcessResult result = Ask({"whoami"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("(unnamed)"));
 }
 
-TEST_F(AccessCommandTest, WhatIsSharedIsListedUntilItIsTakenBack) {
+TEST_F(AccessCommandTest, ListsAShareUntilItIsRemoved) {
   const std::string name = session_->name();
   EXPECT_EQ(Ask({"share", "add", name, "ann", "--role", "planner"}).exit_code, 0);
   EXPECT_THAT(Ask({"share", "list", name}).out, AllOf(HasSubstr("ann"), HasSubstr("planner")));

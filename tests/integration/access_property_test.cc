@@ -578,7 +578,7 @@ class AccessPropertyTest : public ServiceTest {
   int calls_ = 0;
 };
 
-TEST_F(AccessPropertyTest, NobodyIsAnsweredWhatIsNotForThem) {
+TEST_F(AccessPropertyTest, RandomCallsNeverRevealUnauthorizedData) {
   const int calls = CallsToMake();
   for (int restart_at = kCallsBetweenRestarts; calls_ < calls && !HasFailure();) {
     Act();

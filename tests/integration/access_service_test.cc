@@ -114,7 +114,7 @@ TEST_F(AccessServiceTest, ADragEndsWhenTheShareThatItStandsOnIsTakenBackAndTheOw
   EXPECT_TRUE(own->Finish().ok());
 }
 
-TEST_F(AccessServiceTest, APlannerWhoBecomesAViewerDragsNoMoreAndWatchesOn) {
+TEST_F(AccessServiceTest, PlannerDemotedToViewerMayWatchButNotDrag) {
   ASSERT_TRUE(Share("bob", v1::SHARE_ROLE_PLANNER).ok());
   const auto context = ContextOf(bob_);
   std::string name;
@@ -135,7 +135,7 @@ TEST_F(AccessServiceTest, APlannerWhoBecomesAViewerDragsNoMoreAndWatchesOn) {
   EXPECT_EQ(EndOf(watch.get()).error_code(), Code::NOT_FOUND);
 }
 
-TEST_F(AccessServiceTest, AWatchIsAcknowledgedByWhoWatchesAlone) {
+TEST_F(AccessServiceTest, OnlyTheWatcherMayAcknowledgeAWatch) {
   const auto context = ContextOf(ann_);
   std::string name;
   const auto watch = BeginWatch(context.get(), &name);
@@ -198,7 +198,7 @@ TEST_F(AccessServiceTest, OnlyTheOwnerListsSharesAndSharesMustHaveARole) {
             Code::PERMISSION_DENIED);
 }
 
-TEST_F(AccessServiceTest, AnAdminSeesNumbersOfAllAndContentOfNobody) {
+TEST_F(AccessServiceTest, AdminSeesUsageOfAllButNoContent) {
   const Caller admin{.name = "ADMIN", .link = ""};
   v1::GetUsageRequest request;
   request.set_principal("-");
@@ -218,7 +218,7 @@ TEST_F(AccessServiceTest, AnAdminSeesNumbersOfAllAndContentOfNobody) {
             Code::PERMISSION_DENIED);
 }
 
-TEST_F(AccessServiceTest, WithoutATokenNothingIsAnswered) {
+TEST_F(AccessServiceTest, RefusesEveryCallWithoutAToken) {
   grpc::ClientContext context;
   v1::Caller who;
   const grpc::Status status = stubs_->access->WhoAmI(&context, {}, &who);

@@ -86,7 +86,7 @@ TEST_F(BackupProgramTest, ARestoredServerKnowsAllThatWasAcknowledgedBeforeTheBac
   }
 }
 
-TEST_F(BackupProgramTest, AWishForThePacsIsThereAfterwardsAsFarAsItWas) {
+TEST_F(BackupProgramTest, RestoredServerKeepsThePacsExport) {
   v1::Export before;
   {
     const auto client = server_.Connect();

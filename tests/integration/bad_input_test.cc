@@ -85,7 +85,7 @@ class BadUploadTest : public BadInputTest {
 
 TEST_F(BadUploadTest, GoodMessagesAreTaken) { EXPECT_THAT(Upload(GoodMessages()), IsOk()); }
 
-TEST_F(BadUploadTest, HeadersThatCannotBe) {
+TEST_F(BadUploadTest, InvalidHeaders) {
   ExpectRefused([](auto& m) { m[0].mutable_header()->set_vertex_count(5); }, Code::kInvalidArgument,
                 "total_bytes");
   ExpectRefused([](auto& m) { m[0].mutable_header()->set_vertex_count(-5); },
@@ -107,7 +107,7 @@ TEST_F(BadUploadTest, MessagesOutOfOrder) {
   ExpectRefused([](auto& m) { m.clear(); }, Code::kInvalidArgument, "finish_write");
 }
 
-TEST_F(BadUploadTest, ChunksThatCannotBe) {
+TEST_F(BadUploadTest, InvalidChunks) {
   ExpectRefused([](auto& m) { m[1].mutable_chunk()->set_write_offset(1); }, Code::kInvalidArgument,
                 "without gaps");
   ExpectRefused([](auto& m) { m[1].mutable_chunk()->mutable_data()->push_back('x'); },
@@ -193,7 +193,7 @@ TEST_F(BadSessionTest, StiffnessThatIsNotPositive) {
   ExpectRefused([](auto& r) { r.stiffness = "density"; }, Code::kInvalidArgument, "\"density\"");
 }
 
-TEST_F(BadSessionTest, RegionsThatCannotBe) {
+TEST_F(BadSessionTest, InvalidRegions) {
   ExpectRefused([](auto& r) { r.handles.clear(); }, Code::kInvalidArgument, "handle");
   ExpectRefused([](auto& r) { r.handles[0].vertices.clear(); }, Code::kInvalidArgument, "\"top\"");
   ExpectRefused([](auto& r) { r.handles[0].name.clear(); }, Code::kInvalidArgument, "name");
@@ -260,7 +260,7 @@ TEST_F(BadPoseTest, UnknownHandleOrWrongNumber) {
   ExpectRefused({{"top", {}}, {"top", {}}}, Code::kInvalidArgument, "2 poses for 1");
 }
 
-TEST_F(BadPoseTest, NumbersThatAreNoPose) {
+TEST_F(BadPoseTest, InvalidPoseNumbers) {
   ExpectRefused(TopPose({.translation_mm = {0, kNan, 0}}), Code::kInvalidArgument, "translation");
   ExpectRefused(TopPose({.rotation_vector = {kInfinity, 0, 0}}), Code::kInvalidArgument,
                 "rotation");
@@ -339,7 +339,7 @@ TEST_F(BadStreamTest, AMessageOverTheTransportLimit) {
               StatusIs(Code::kResourceExhausted, HasSubstr("larger than")));
 }
 
-TEST_F(BadStreamTest, ConfigurationsThatCannotBe) {
+TEST_F(BadStreamTest, InvalidConfigurations) {
   const auto refused = [this](auto change, const char* text) {
     v1::DeformRequest request = configuration_;
     change(*request.mutable_configuration());

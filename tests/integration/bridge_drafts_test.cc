@@ -195,7 +195,7 @@ TEST_F(BridgeDraftsTest, APlanOfADraftIsThatOfTheSeriesAndBelongsToItsStudy) {
       << "what is looked for would be found";
 }
 
-TEST_F(BridgeDraftsTest, ADraftThatIsRemovedIsSentAgainOnlyOnWish) {
+TEST_F(BridgeDraftsTest, RemovedDraftIsSentAgainOnlyOnRequest) {
   QueuedSeries series = Receive();
   ASSERT_THAT(work_->Step(&series), IsOk());
   ASSERT_OK_AND_ASSIGN(const std::vector<v1::BuildDraft> drafts,

@@ -64,7 +64,7 @@ TEST_F(CaseCommandTest, APublishedCaseIsTheFileAndItsMeshIsThere) {
   EXPECT_THAT(OfServer({"show", name}), FailsWith(1, HasSubstr("no case")));
 }
 
-TEST_F(CaseCommandTest, WhatIsNoCaseIsNotSent) {
+TEST_F(CaseCommandTest, DoesNotSendAFileThatIsNotACase) {
   std::ofstream(Path("text.tfcase")) << "a text";
   EXPECT_THAT(OfServer({"publish", "text.tfcase"}),
               FailsWith(1, AllOf(HasSubstr("text.tfcase"), HasSubstr("case pack"))));

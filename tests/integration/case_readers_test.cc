@@ -66,7 +66,7 @@ TEST_P(VtkCaseTest, FindsOurSurfacesWhereTheyAre) {
 INSTANTIATE_TEST_SUITE_P(Plans, VtkCaseTest, ::testing::Values("head", "three_segments", "bar"),
                          [](const auto& plan) { return plan.param; });
 
-TEST_F(CaseReadersTest, VtkFindsWhatPlanBuildWritesForViewers) {
+TEST_F(CaseReadersTest, VtkReadsTheViewerFileOfPlanBuild) {
   const std::string path = SourcePath(absl::StrCat("tests/data/plans/head/", kViewerFile));
   ASSERT_OK_AND_ASSIGN(const ViewerFile viewer, ReadViewer(path));
   WriteWhatWeFind(viewer.surfaces);
@@ -75,7 +75,7 @@ TEST_F(CaseReadersTest, VtkFindsWhatPlanBuildWritesForViewers) {
   EXPECT_EQ(exit_code, 0) << Read("others.txt");
 }
 
-TEST_F(CaseReadersTest, TheValidatorOfGltfFindsNothingWrong) {
+TEST_F(CaseReadersTest, GltfValidatorReportsNoErrors) {
   const std::string modules = SourcePath("deploy/protocol_tools/node_modules");
   if (!std::filesystem::exists(modules + "/gltf-validator")) {
     GTEST_SKIP() << "gltf-validator is missing: deploy/install_protocol_tools.sh installs it";

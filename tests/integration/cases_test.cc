@@ -70,7 +70,7 @@ TEST_F(CasesTest, ACaseOverTheLimitIsRefused) {
   EXPECT_THAT(client->cases().Upload(CaseOf(1000), ""), IsOk());
 }
 
-TEST_F(CasesTest, NamesThatAreNoneAreRefused) {
+TEST_F(CasesTest, RefusesInvalidNames) {
   for (const std::string name : {"", "cases/", "cases/../../etc/passwd", "meshes/0"}) {
     EXPECT_THAT(calls().Get(name), StatusIs(absl::StatusCode::kInvalidArgument)) << name;
     EXPECT_THAT(calls().Delete(name), StatusIs(absl::StatusCode::kInvalidArgument)) << name;

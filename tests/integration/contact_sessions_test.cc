@@ -225,7 +225,7 @@ TEST_F(ContactSessionsTest, PredictionsDistinguishRecipesWithOtherRows) {
   EXPECT_EQ(recipes[0], recipes[2]);
 }
 
-TEST_F(ContactSessionsTest, ABandOfUncertaintyIsRefusedAndNotAskedForByPlans) {
+TEST_F(ContactSessionsTest, UncertaintyBandIsRefusedAndNotRequestedForPlans) {
   const auto client = Connect();
   PlanProblem problem = Problem(block_.rows);
   MaterialUncertainty& ranges = problem.uncertainty.emplace();

@@ -200,7 +200,7 @@ TEST_F(DeformStreamTest, ADeletedSessionEndsItsStreams) {
   ExpectServes();
 }
 
-TEST_F(DeformStreamTest, ACancelledStreamLeavesNothingAndDisturbsNobody) {
+TEST_F(DeformStreamTest, CancelledStreamIsCleanedUpWithoutAffectingOthers) {
   for (int i = 0; i < 10; ++i) {
     const auto stream = Open();
     for (int sequence = 1; sequence <= i; ++sequence) {
@@ -214,7 +214,7 @@ TEST_F(DeformStreamTest, ACancelledStreamLeavesNothingAndDisturbsNobody) {
   ExpectServes();
 }
 
-TEST_F(DeformStreamTest, AVanishedConnectionLeavesNothingAndDisturbsNobody) {
+TEST_F(DeformStreamTest, LostConnectionIsCleanedUpWithoutAffectingOthers) {
   for (int i = 0; i < 5; ++i) {
     const auto stub = v1::DeformService::NewStub(OwnChannel());
     grpc::ClientContext context;
@@ -231,7 +231,7 @@ TEST_F(DeformStreamTest, AVanishedConnectionLeavesNothingAndDisturbsNobody) {
   ExpectServes();
 }
 
-TEST_F(DeformStreamTest, AFloodOfPosesWithoutAcknowledgementsIsTwoFramesAndTheNewestPose) {
+TEST_F(DeformStreamTest, UnacknowledgedPoseFloodGetsTwoFramesAndTheNewestPose) {
   constexpr int kFlood = 20'000;
   const int64_t bytes = server().memory_budget().reserved_bytes();
   const auto flood = Open();
@@ -255,7 +255,7 @@ TEST_F(DeformStreamTest, AFloodOfPosesWithoutAcknowledgementsIsTwoFramesAndTheNe
   ExpectServes();
 }
 
-TEST_F(DeformStreamTest, AReaderThatNeverReadsBlocksNobody) {
+TEST_F(DeformStreamTest, StalledReaderBlocksNoOtherStream) {
   const BarProblem big(2, {8, 8, 24});
   const std::string big_session = MakeSession(client_.get(), big).name();
   const auto stub = v1::DeformService::NewStub(OwnChannel());

@@ -113,7 +113,7 @@ TEST_F(DoctorTest, AGoodServerWithTlsAndLogins) {
                     HasSubstr("dragged and deleted")));
 }
 
-TEST_F(DoctorTest, NoSuchName) {
+TEST_F(DoctorTest, UnknownHostName) {
   ExpectEndsWith(AskDoctor({.address = "no-such-host.invalid:50051"}), "name",
                  "no-such-host.invalid", "DNS");
 }
@@ -219,7 +219,7 @@ std::vector<RefusedToken> RefusedTokens() {
 class DoctorRefusedTokenTest : public DoctorTest,
                                public ::testing::WithParamInterface<RefusedToken> {};
 
-TEST_P(DoctorRefusedTokenTest, SaysWhatWasFoundAndExpectedAndWhatHelps) {
+TEST_P(DoctorRefusedTokenTest, ReportsFoundAndExpectedValuesWithAdvice) {
   const TokenFiles tokens;
   ServerOptions options = TestOptions();
   options.tokens = tokens.Options();
@@ -267,7 +267,7 @@ void PrintTo(const OldProxy& proxy, std::ostream* out) { *out << proxy.name; }
 
 class DoctorOldProxyTest : public DoctorTest, public ::testing::WithParamInterface<OldProxy> {};
 
-TEST_P(DoctorOldProxyTest, IsNamedWithWhatAlpnSelects) {
+TEST_P(DoctorOldProxyTest, ReportsTheProtocolThatAlpnSelects) {
   std::vector<std::string> words = {SourcePath("tests/integration/serve_tls.py"),
                                     GetParam().words.front(), own_.certificate, own_.key};
   words.insert(words.end(), GetParam().words.begin() + 1, GetParam().words.end());
@@ -296,7 +296,7 @@ TEST_F(DoctorTest, AFullServer) {
   ExpectEndsWith(AskDoctor({.address = name()}), "work", "RESOURCE_EXHAUSTED", "full");
 }
 
-TEST_F(DoctorTest, WhatIsNoAddress) {
+TEST_F(DoctorTest, InvalidAddress) {
   for (const char* address : {"", "planner", "planner:", "planner:0", "planner:65536", "::1:80"}) {
     ExpectEndsWith(AskDoctor({.address = address}), "name", "HOST:PORT", "");
   }

@@ -45,7 +45,7 @@ class DragCommandTest : public ServedCliTest {
   }
 };
 
-TEST_F(DragCommandTest, AnswersEveryPoseHereToo) {
+TEST_F(DragCommandTest, LocalOptionAnswersEveryPoseLocallyToo) {
   const ProcessResult drag = Drag(kBarFolder + "plan.json", {"--local"});
   EXPECT_THAT(drag, Succeeds());
   EXPECT_THAT(drag.out,
@@ -54,7 +54,7 @@ TEST_F(DragCommandTest, AnswersEveryPoseHereToo) {
                     ContainsRegex("prepared range; [0-9.]+ ms \\(p50\\)")));
 }
 
-TEST_F(DragCommandTest, AnswersNothingHereUnlessAsked) {
+TEST_F(DragCommandTest, AnswersNothingLocallyByDefault) {
   const ProcessResult drag = Drag(kBarFolder + "plan.json", {});
   EXPECT_THAT(drag, Succeeds());
   EXPECT_THAT(drag.out, AllOf(HasSubstr("5 poses, "), Not(HasSubstr("answered locally"))));

@@ -20,7 +20,7 @@ class ErrorReasonsTest : public ServiceTest {
   const BarProblem problem_{5};
 };
 
-TEST_F(ErrorReasonsTest, WhatTheServerHasNoRoomFor) {
+TEST_F(ErrorReasonsTest, ServerLimits) {
   ServerOptions options = TestOptions();
   options.limits.max_sessions = 1;
   options.limits.max_streams = 1;

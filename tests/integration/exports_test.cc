@@ -77,7 +77,7 @@ class ExportsTest : public ServiceTest {
   std::string session_;
 };
 
-TEST_F(ExportsTest, AnExportIsWhatWasAskedAndGoesForwardOnly) {
+TEST_F(ExportsTest, ExportKeepsItsRequestAndOnlyMovesForward) {
   const std::string prediction = Predict();
   ASSERT_OK_AND_ASSIGN(const v1::Export made, exports().Create(prediction, {SomeMeasure()}));
   EXPECT_EQ(made.prediction(), prediction);
@@ -104,7 +104,7 @@ TEST_F(ExportsTest, AnExportIsWhatWasAskedAndGoesForwardOnly) {
               StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
-TEST_F(ExportsTest, APatientWhoIsAnotherOneByThenIsSeenAnewWhileItIsStored) {
+TEST_F(ExportsTest, StoringExportMayReturnToConfirmation) {
   ASSERT_OK_AND_ASSIGN(const v1::Export made, exports().Create(Predict()));
   ASSERT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_STORING)), IsOk());
   EXPECT_THAT(exports().Update(Change(made.name(), v1::EXPORT_STATE_CONFIRMATION)), IsOk());

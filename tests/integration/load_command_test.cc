@@ -76,7 +76,7 @@ TEST_F(LoadCommandTest, ReportsTheAnswersOfOneServerWithoutACluster) {
   EXPECT_EQ(node["commit_ms"]["count"], 6);
 }
 
-TEST_F(LoadCommandTest, RefusesWhatCannotBeMeasured) {
+TEST_F(LoadCommandTest, RefusesInvalidOptions) {
   EXPECT_THAT(Load({"--sessions", "0", "--churn", "0"}), FailsWith(1, HasSubstr("--sessions")));
   EXPECT_THAT(Load({"--sessions", "0", "--churn", "1", "--bare"}),
               FailsWith(1, HasSubstr("--bare")));

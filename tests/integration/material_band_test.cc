@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(Models, ElasticBandTest,
                                            v1::DEFORMATION_MODEL_NEO_HOOKEAN),
                          [](const auto& test) { return v1::DeformationModel_Name(test.param); });
 
-TEST_F(MaterialBandTest, IsNotKnownOfModelsThatAreNoneOfElasticity) {
+TEST_F(MaterialBandTest, IsUnknownForNonElasticModels) {
   for (const auto model : {v1::DEFORMATION_MODEL_GRADIENT_FIELD, v1::DEFORMATION_MODEL_ARAP}) {
     ASSERT_OK_AND_ASSIGN(const auto band,
                          AskMaterialBand(client_.get(), contents_, Predict(model)));
@@ -98,7 +98,7 @@ TEST_F(MaterialBandTest, IsNotKnownOfModelsThatAreNoneOfElasticity) {
   }
 }
 
-TEST_F(MaterialBandTest, IsNotKnownOfACaseWithoutRanges) {
+TEST_F(MaterialBandTest, IsUnknownForACaseWithoutRanges) {
   contents_.material_ranges.reset();
   const v1::Prediction prediction = Predict(v1::DEFORMATION_MODEL_LINEAR_ELASTIC);
   ASSERT_OK_AND_ASSIGN(const auto band, AskMaterialBand(client_.get(), contents_, prediction));
@@ -107,7 +107,7 @@ TEST_F(MaterialBandTest, IsNotKnownOfACaseWithoutRanges) {
 }
 
 // Linear elasticity has answers there, which mean nothing.
-TEST_F(MaterialBandTest, IsNotKnownOfTurnsThatAreTakenForStrain) {
+TEST_F(MaterialBandTest, IsUnknownForTurnsTooLargeForLinearElasticity) {
   const auto turned = [this](double turn_rad) {
     HandlePose pose;
     pose.rotation_vector.y() = turn_rad;
@@ -126,7 +126,7 @@ TEST_F(MaterialBandTest, IsNotKnownOfTurnsThatAreTakenForStrain) {
   EXPECT_EQ(WhyNoMaterialBand(contents_, prediction), "");
 }
 
-TEST_F(MaterialBandTest, IsNotKnownOfAnotherStiffnessThanTheCases) {
+TEST_F(MaterialBandTest, IsUnknownIfTheStiffnessDiffersFromTheCase) {
   SessionRequest uniform = problem_.Request(contents_.mesh.name);
   uniform.stiffness = 1000.0;
   contents_.session_request = ToProto(uniform).SerializeAsString();

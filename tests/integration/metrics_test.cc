@@ -79,7 +79,7 @@ TEST_F(MetricsTest, ADragIsSeen) {
   EXPECT_EQ(Value("tissueform_calls_open{rpc=\"DeformService.Deform\"}"), 0);
 }
 
-TEST_F(MetricsTest, PromtoolFindsNothingToSay) {
+TEST_F(MetricsTest, PromtoolReportsNoProblems) {
   if (std::system("promtool --version > /dev/null 2>&1") != 0) {
     GTEST_SKIP() << "promtool is missing: deploy/packages.txt lists prometheus";
   }

@@ -56,7 +56,7 @@ TEST_F(OtherClientsTest, PythonFindsTheReasonOfEveryRpcsError) {
 }
 
 // docs/service-api.md documents this limit.
-TEST_F(OtherClientsTest, WhoPingsTooOftenIsCutOff) {
+TEST_F(OtherClientsTest, ClientThatPingsTooOftenIsDisconnected) {
   EXPECT_EQ(RunPython("ping_too_often.py"), 0) << Read("out.txt");
   EXPECT_EQ(Read("out.txt"),
             "first three: ['answered', 'answered', 'answered']\n"

@@ -105,7 +105,7 @@ TEST_F(OtherReadersTest, BundledMeshes) {
   }
 }
 
-TEST_F(OtherReadersTest, EveryNumberTypeAndNumbersThatAreNone) {
+TEST_F(OtherReadersTest, EveryNumberTypeAndNonFiniteNumbers) {
   ASSERT_OK_AND_ASSIGN(TetMeshFile file, ReadTetMesh(Path("bar.vtu")));
   const auto count = static_cast<size_t>(file.mesh.num_vertices());
   std::vector<Attribute>& data = file.point_data;

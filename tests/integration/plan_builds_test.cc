@@ -263,7 +263,7 @@ TEST_F(PlanBuildsOfServerTest, APlanIsThatOfTheCommandByteForByte) {
             Code::NOT_FOUND);
 }
 
-TEST_F(PlanBuildsOfServerTest, AnUploadThatBrokeOffGoesOn) {
+TEST_F(PlanBuildsOfServerTest, ResumesAnInterruptedUpload) {
   Start();
   const auto context = ContextOf(ann_);
   v1::BuildFile file;
@@ -435,7 +435,7 @@ TEST_F(PlanBuildsOfServerTest, RefusesInvalidDrafts) {
             Code::INVALID_ARGUMENT);
 }
 
-TEST_F(PlanBuildsOfServerTest, AServerThatBuildsNoneSaysSo) {
+TEST_F(PlanBuildsOfServerTest, ServerWithoutPlanBuildsSaysSo) {
   Start({.at_once = 0});
   v1::BuildFile file;
   EXPECT_EQ(Send(ann_, ct_, ".nrrd", 0, &file).error_code(), Code::FAILED_PRECONDITION);

@@ -124,7 +124,7 @@ TEST_F(PlanServiceTest, AKnownPoseIsFoundAgain) {
   EXPECT_EQ(fit.contradictions_size(), 0);
 }
 
-TEST_F(PlanServiceTest, TheModelItselfHasTheLastWordWhereThatIsAsked) {
+TEST_F(PlanServiceTest, VerifiedFitUsesTheModelItself) {
   v1::FitRequest request = Wanted(SomePose(2));
   request.set_model(v1::DEFORMATION_MODEL_NEO_HOOKEAN);
   request.set_verify(true);
@@ -225,7 +225,7 @@ TEST_F(PlanServiceTest, BadRequestsAreRefusedInALineThatNamesTheCulprit) {
   EXPECT_THAT(Fit(good), IsOk());
 }
 
-TEST_F(PlanServiceTest, ACallThatNobodyWaitsForAnyLongerEndsAndLeavesTheSessionAsItWas) {
+TEST_F(PlanServiceTest, AbandonedFitEndsAndLeavesTheSessionUnchanged) {
   // One deadline could find every fit already done; ever shorter ones end fits wherever they are.
   constexpr int kFits = 50;
   int ended = 0;

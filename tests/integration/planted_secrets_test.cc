@@ -109,7 +109,7 @@ class PlantedSecretsTest : public ServiceTest {
   std::shared_ptr<spdlog::logger> before_;
 };
 
-TEST_F(PlantedSecretsTest, AreNeitherInLogNorMetricsNorAudit) {
+TEST_F(PlantedSecretsTest, DoNotAppearInLogMetricsOrAudit) {
   const BarProblem problem(1);
   const auto client = Connect();
   const v1::Session session = MakeSession(client.get(), problem);

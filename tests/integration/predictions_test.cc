@@ -104,7 +104,7 @@ TEST_F(PredictionsTest, CaseAndTitleAreKeptAndListedBy) {
   EXPECT_THAT(create({.title = "b"}, "one"), Because(ErrorReason::kRequestIdReused));
 }
 
-TEST_F(PredictionsTest, ACaseOrTitleThatIsNoneIsRefused) {
+TEST_F(PredictionsTest, RefusesAnInvalidCaseOrTitle) {
   const auto refused = [&](const PredictionLabel& label, const std::string& why) {
     EXPECT_THAT(calls().Create(session_.name(), TopPose(SomePose(1)), {}, "", label),
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(why)));

@@ -87,7 +87,7 @@ TEST_F(PreparedEvaluatorTest, AnswersWithinTheRangeAndSaysWhereItEnds) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("top")));
 }
 
-TEST_F(PreparedEvaluatorTest, ACallThatBrokeOffGoesOnWithTheSameBytes) {
+TEST_F(PreparedEvaluatorTest, InterruptedDownloadResumesWithTheSameBytes) {
   const Fetched all = Fetch(Request());
   ASSERT_TRUE(all.status.ok()) << all.status.error_message();
   ASSERT_GT(all.bytes.size(), 1000U);
@@ -101,7 +101,7 @@ TEST_F(PreparedEvaluatorTest, ACallThatBrokeOffGoesOnWithTheSameBytes) {
   EXPECT_EQ(Fetch(Request(all.header.total_bytes())).bytes, "");
 }
 
-TEST_F(PreparedEvaluatorTest, WhatCannotBeGivenIsRefused) {
+TEST_F(PreparedEvaluatorTest, RefusesInvalidRequests) {
   const auto code = [this](const v1::GetPreparedAnswersRequest& request) {
     return Fetch(request).status.error_code();
   };

@@ -111,7 +111,7 @@ TEST_F(QuotasTest, MeshesCasesAndPredictionsShareTheDisk) {
   EXPECT_EQ(usage.principals(0).disk_bytes(), 60'000);
 }
 
-TEST_F(QuotasTest, WhoCallsTooOftenIsRefusedAndNobodyElse) {
+TEST_F(QuotasTest, OnlyTheCallerAboveTheRateLimitIsRefused) {
   Start({.calls_per_second = 5});
   grpc::Status refused;
   for (int i = 0; i < 100 && refused.ok(); ++i) {
@@ -123,7 +123,7 @@ TEST_F(QuotasTest, WhoCallsTooOftenIsRefusedAndNobodyElse) {
   EXPECT_TRUE(stubs_->access->WhoAmI(ContextOf(bob_).get(), {}, &caller).ok());
 }
 
-TEST_F(QuotasTest, PosesOfADragAreNoCalls) {
+TEST_F(QuotasTest, PosesOfADragDoNotCountAsCalls) {
   Start({.calls_per_second = 20, .streams = 1});
   const SentMesh mesh(1);
   v1::UploadMeshResponse uploaded;

@@ -170,7 +170,7 @@ TEST_F(ServedCommandTest, MeshesAreUploadedListedAndDeleted) {
   EXPECT_NE(OfServer({"mesh", "upload", "none.vtu"}).exit_code, 0);
 }
 
-TEST_F(ServedCommandTest, AnUploadThatWasBrokenOffGoesOnAndSaysSo) {
+TEST_F(ServedCommandTest, ResumesAnInterruptedUploadAndSaysSo) {
   const TetMeshFile file{.mesh = *tongue_.mesh, .point_data = {}, .cell_data = {}};
   ASSERT_THAT(WriteTetMesh(Path("mesh.vtu"), file), IsOk());
   const MeshPayloadView payload = ViewMeshPayload(file.mesh.positions(), file.mesh.tets(), {});
@@ -307,7 +307,7 @@ TEST_F(DemoCommandTest, MovesTheJawOfTheBundledHeadBy8MmAlsoWithoutADisplay) {
   EXPECT_LT(summary["movement"]["nose"]["foremost"]["total_mm"], 1);
 }
 
-TEST_F(DemoCommandTest, ServesWhatItPredictedUntilItIsInterrupted) {
+TEST_F(DemoCommandTest, ServesItsPredictionUntilInterrupted) {
   const std::string command = "echo $$; exec env -u DISPLAY PATH=/nonexistent " +
                               ProgramPath("tissueform") + " demo --serve --seconds 0.1 --plan " +
                               kTonguePlan + " --out " + folder_.string() + " 2>" + Path("err");
@@ -337,7 +337,7 @@ TEST_F(DemoCommandTest, ServesWhatItPredictedUntilItIsInterrupted) {
   EXPECT_EQ(WEXITSTATUS(pclose(demo)), 0);
 }
 
-TEST_F(DemoCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork) {
+TEST_F(DemoCommandTest, ReportsATakenPortInOneLineBeforeAnyWork) {
   ASSERT_OK_AND_ASSIGN(
       const auto other,
       ServerProcess::Start(ProgramPath("tissueform-server"),
@@ -353,7 +353,7 @@ TEST_F(DemoCommandTest, APortThatTheUserChoseAndIsTakenIsOneLineBeforeAnyWork) {
   }
 }
 
-TEST(ServerProcessTest, AProgramThatEndsBeforeItListensIsNamed) {
+TEST(ServerProcessTest, NamesAProgramThatEndsBeforeItListens) {
   for (const char* program : {"tissueform-server", "tissueform-gateway"}) {
     EXPECT_THAT(
         ServerProcess::Start(ProgramPath(program), {"--no-such-option"}, kPatience).status(),

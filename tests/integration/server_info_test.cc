@@ -56,7 +56,7 @@ TEST_F(ServerInfoTest, VersionAndLimitsAreThoseOfTheServer) {
   EXPECT_EQ(limits.at("memory_budget_bytes"), int64_t{5} << 30);
 }
 
-TEST_F(ServerInfoTest, ModelsCanWhatIsSaidOfThem) {
+TEST_F(ServerInfoTest, ModelsSupportTheirAdvertisedFeatures) {
   const auto client = Connect();
   const v1::Session session = MakeSession(client.get(), BarProblem(6));
   const v1::ServerInfo info = Info();

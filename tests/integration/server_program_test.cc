@@ -88,7 +88,7 @@ class ServerProgramTest : public ::testing::Test {
   std::unique_ptr<TissueformClient> client_;
 };
 
-TEST_F(ServerProgramTest, EndsWithZeroWhenNobodyIsThere) {
+TEST_F(ServerProgramTest, ExitsWithZeroWithoutActiveClients) {
   process_->Terminate();
   // Although an idle client stays connected.
   EXPECT_EQ(process_->WaitForExit(std::chrono::seconds(4)), 0);
@@ -169,7 +169,7 @@ TEST(ServerSignalsTest, ASecondSignalDoesNotCutTheDrainOff) {
   EXPECT_EQ(end.exit_code, 0) << "signal " << end.signal;
 }
 
-TEST_F(ServerProgramTest, AStreamThatDoesNotEndIsCutAtTheDrainDeadline) {
+TEST_F(ServerProgramTest, CutsAnOpenStreamAtTheDrainDeadline) {
   process_ = StartProgram({"--drain-seconds", "0"});
   auto client = TissueformClient::Connect(process_->address(), {});
   ASSERT_THAT(client, IsOk());
@@ -197,7 +197,7 @@ int ConnectTo(const std::string& host_and_port) {
   return -1;
 }
 
-TEST(ServerProgramStartTest, TheServerEndsAlsoWhenItsStarterIsKilled) {
+TEST(ServerProgramStartTest, ServerEndsWhenItsStarterIsKilled) {
   KilledStarter starter([] {
     const std::unique_ptr<ServerProcess>& kept = *new auto(StartProgram({"--host", "127.0.0.1"}));
     return kept == nullptr ? "" : kept->address();

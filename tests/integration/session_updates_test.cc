@@ -85,7 +85,7 @@ TEST_F(SessionUpdatesTest, OtherHandlesEndADragWithAReason) {
   EXPECT_THAT(client->DeformOnce(session.name(), {{"crown", SomePose(1)}}), IsOk());
 }
 
-TEST_F(SessionUpdatesTest, WhatIsRefusedSaysWhyAndChangesNothing) {
+TEST_F(SessionUpdatesTest, RefusedUpdateSaysWhyAndChangesNothing) {
   const auto client = Connect();
   const v1::Session session = MakeSession(client.get(), problem_);
   v1::UpdateSessionRequest request;

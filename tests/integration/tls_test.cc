@@ -94,7 +94,7 @@ TEST_F(TlsTest, OnlyACertificateOfTheAuthorityGetsInWhereOneIsRequired) {
   EXPECT_THAT(ConnectWith(Shown(strange)), StatusIs(kUnavailable));
 }
 
-TEST_F(TlsTest, WhereOneIsOptionalABadOneIsRefusedAllTheSame) {
+TEST_F(TlsTest, RefusesABadClientCertificateEvenIfOptional) {
   Serve(true, false);
   const TestFiles strange = stranger_.IssueFiles(folder_, "strange");
   EXPECT_THAT(ConnectWith({.tls_ca = own_.roots}), IsOk());
@@ -164,7 +164,7 @@ TEST_F(TlsTest, RotationUnderLoadFailsNoCall) {
   std::printf("%d calls, %d failed\n", calls.load(), failures.load());
 }
 
-TEST_F(TlsTest, NonsenseInTheFilesLeavesTheCertificateBefore) {
+TEST_F(TlsTest, InvalidFilesLeaveThePreviousCertificateInUse) {
   Serve(false);
   // Issuing rewrites server-ca.pem as well.
   const ConnectionOptions connection = {.tls_ca = folder_ / "ca.pem"};
@@ -175,7 +175,7 @@ TEST_F(TlsTest, NonsenseInTheFilesLeavesTheCertificateBefore) {
   EXPECT_EQ(server().tls_files()->rotations(), 0);
 }
 
-TEST_F(TlsTest, WhatCannotBeUsedEndsTheStartInOneLine) {
+TEST_F(TlsTest, UnusableOptionsFailTheStartWithOneLine) {
   const TestFiles old =
       authority_.IssueFiles(folder_, "old", {.begins = hours(-48), .ends = hours(-24)});
   ServerOptions options = TestOptions();
@@ -203,7 +203,7 @@ int RawConnection(int port) {
   return -1;
 }
 
-TEST_F(TlsTest, WhoDoesNotFinishAHandshakeHoldsNobodyUp) {
+TEST_F(TlsTest, UnfinishedHandshakesDoNotBlockOthers) {
   Serve(false);
   // Plain text, nothing at all, and the beginning of a handshake.
   const std::vector<std::string> openings = {"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", "",

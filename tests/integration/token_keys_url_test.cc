@@ -122,7 +122,7 @@ TEST_F(TokenKeysUrlTest, ItIsAskedRarelyHoweverManyUnknownKeysCome) {
   EXPECT_EQ(authenticator->failures().count(TokenFailure::kUnknownKey), 1000);
 }
 
-TEST_F(TokenKeysUrlTest, NobodyIsFollowedAndNothingWithoutEndIsRead) {
+TEST_F(TokenKeysUrlTest, FollowsNoRedirectAndReadsNoEndlessBody) {
   const std::atomic<bool> stopping = false;
   EXPECT_THAT(DownloadJwks(Options("/elsewhere").jwks_url, stopping),
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr("HTTP status 302")));
@@ -150,7 +150,7 @@ struct BadUrl {
 
 class BadUrlTest : public ::testing::TestWithParam<BadUrl> {};
 
-TEST_P(BadUrlTest, IsRefusedBeforeAnybodyIsAsked) {
+TEST_P(BadUrlTest, IsRefusedWithoutARequest) {
   EXPECT_THAT(CheckJwksUrl(GetParam().url),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().error)));
 }

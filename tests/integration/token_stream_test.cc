@@ -178,7 +178,7 @@ TEST_F(TokenStreamTest, ADragGoesOnWithANewerToken) {
   EXPECT_TRUE(call->Finish().ok());
 }
 
-TEST_F(TokenStreamTest, ADragTakesNobodyElsesToken) {
+TEST_F(TokenStreamTest, DragRefusesATokenOfAnotherUser) {
   const auto stub = v1::DeformService::NewStub(OwnChannel());
   grpc::ClientContext context;
   const auto call = stub->Deform(&context);
@@ -193,7 +193,7 @@ TEST_F(TokenStreamTest, ADragTakesNobodyElsesToken) {
   EXPECT_EQ(call->Finish().error_code(), grpc::StatusCode::UNAUTHENTICATED);
 }
 
-TEST_F(TokenStreamTest, ARevocationEndsDragsAndWatchesAndNobodyElses) {
+TEST_F(TokenStreamTest, RevocationEndsOnlyDragsAndWatchesOfThatToken) {
   const std::string revoked = EcKey().MakeToken(With(GoodClaims(), "jti", "lost-laptop"));
   ASSERT_OK_AND_ASSIGN(const auto kept, client_->OpenStream(session_, {}));
   CallersBearer().Set(revoked);

@@ -72,7 +72,7 @@ class TransportProgramsTest : public ServiceTest {
   std::string said_;
 };
 
-TEST_F(TransportProgramsTest, OthersSpeakWithTheServerByMutualTls) {
+TEST_F(TransportProgramsTest, OtherClientsConnectByMutualTls) {
   Serve();
   const int exit_code = Run(
       absl::StrCat(TISSUEFORM_PYTHON, " ", SourcePath("tests/integration/tls_clients.py"), " ",
@@ -107,7 +107,7 @@ TEST_F(TransportProgramsTest, ACommandThatCannotConnectSaysOneLine) {
   EXPECT_THAT(said_, MatchesRegex("tissueform: [^\n]+\n"));
 }
 
-TEST_F(TransportProgramsTest, TheGatewaysCertificateDoesNotStandForItsUsers) {
+TEST_F(TransportProgramsTest, GatewayCertificateDoesNotAuthenticateItsUsers) {
   const TokenFiles tokens;
   Serve(tokens.Options());
   const TestFiles gateway_files =
@@ -186,7 +186,7 @@ TEST_F(TransportProgramsTest, ADragOutlivesItsFirstToken) {
   EXPECT_THAT(client->GetSession(session.name()), IsOk());
 }
 
-TEST_F(TransportProgramsTest, ThroughHaproxyADragGoesOnBesideAFlood) {
+TEST_F(TransportProgramsTest, DragThroughHaproxyContinuesDuringAFlood) {
   const int exit_code =
       Run(absl::StrCat(TISSUEFORM_PYTHON, " ", SourcePath("tests/integration/flood_haproxy.py"),
                        " ", ProgramPath("tissueform"), " ", ProgramPath("tissueform-server"), " ",

@@ -100,7 +100,7 @@ class UploadsTest : public ServiceTest {
   absl::Status interrupted_;
 };
 
-TEST_F(UploadsTest, WhatAnotherBrokeOffIsNotSentAgain) {
+TEST_F(UploadsTest, ResumesAnUploadInterruptedByAnotherClient) {
   const auto client = Connect();
   RawUpload broken(OwnChannel(), problem_);
   broken.SendUpTo(1000);
@@ -117,7 +117,7 @@ TEST_F(UploadsTest, WhatAnotherBrokeOffIsNotSentAgain) {
   EXPECT_THAT(client->QueryUpload(broken.name()), StatusIs(absl::StatusCode::kNotFound));
 }
 
-TEST_F(UploadsTest, WhatAnotherSendsIsWaitedFor) {
+TEST_F(UploadsTest, WaitsForAnUploadByAnotherClient) {
   const auto client = Connect();
   RawUpload other(OwnChannel(), problem_);
   other.SendUpTo(1000);
@@ -134,7 +134,7 @@ TEST_F(UploadsTest, WhatAnotherSendsIsWaitedFor) {
   ExpectWhole(client.get(), mesh);
 }
 
-TEST_F(UploadsTest, ItGivesUpWhenNothingComesFarther) {
+TEST_F(UploadsTest, GivesUpWhenTheOtherUploadStalls) {
   const auto client = Connect();
   RawUpload other(OwnChannel(), problem_);
   other.SendUpTo(1000);
@@ -143,7 +143,7 @@ TEST_F(UploadsTest, ItGivesUpWhenNothingComesFarther) {
   EXPECT_THAT(Upload(client.get()), StatusIs(absl::StatusCode::kAborted));
 }
 
-TEST_F(UploadsTest, WithoutRoomNothingIsSentAgainButTheWordThatItIsComplete) {
+TEST_F(UploadsTest, RetryAfterAFullServerSendsOnlyTheCompletion) {
   ServerOptions options = TestOptions();
   const std::vector<CellArray> arrays = problem_.CellArrays();
   const int64_t peak_bytes =

@@ -62,7 +62,7 @@ TEST_F(WatchStreamTest, AnotherClientSeesADragInItsVerticesAndEncoding) {
   EXPECT_TRUE(Eventually([this] { return server().watches().size() == 0; }));
 }
 
-TEST_F(WatchStreamTest, ADragHearsThatSomebodyFollowsAndThatNobodyDoesAnyLonger) {
+TEST_F(WatchStreamTest, DragIsNotifiedWhenAFollowerJoinsAndLeaves) {
   int followers = -1;
   DeformStream::Options options;
   options.on_notice = [&followers](const v1::DeformNotice& notice) {
@@ -91,7 +91,7 @@ TEST_F(WatchStreamTest, ADragHearsThatSomebodyFollowsAndThatNobodyDoesAnyLonger)
   EXPECT_THAT(drag->Finish(), IsOk());
 }
 
-TEST_F(WatchStreamTest, ADrainSaysWhenItEndsAndDoesNotWaitForThoseWhoWatch) {
+TEST_F(WatchStreamTest, DrainAnnouncesItsEndAndDoesNotWaitForWatchers) {
   std::optional<v1::DeformNotice> notice;
   WatchStream::Options options;
   options.on_notice = [&notice](const v1::DeformNotice& said) { notice = said; };

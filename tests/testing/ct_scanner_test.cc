@@ -146,7 +146,7 @@ TEST(CtScannerTest, BoneComesBackWithinItsBeamHardening) {
   EXPECT_NEAR(Of(scanned, 10, -40).mean, 40, 15);
 }
 
-TEST(CtScannerTest, MetalIsCutOffAndDarkensWhatLiesBetween) {
+TEST(CtScannerTest, MetalIsClippedAndDarkensTheTissueBetween) {
   const CtScanner scanner;
   const std::vector<int16_t> water = Disc(85, 0);
   std::vector<MetalCell> pins = MetalDisc(3, -25, 0);

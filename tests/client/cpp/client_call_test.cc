@@ -26,7 +26,7 @@ std::string DetailsWith(int code, ErrorReason reason) {
 
 constexpr auto kCut = grpc::StatusCode::CANCELLED;
 
-TEST(EndOfCallTest, TheCodeAndTheMessageOfTheServerCount) {
+TEST(EndOfCallTest, ServersCodeAndMessageTakePrecedence) {
   const absl::Status end =
       EndOfCall({kCut, "RST_STREAM", DetailsWith(5, ErrorReason::kSessionNotFound)});
   EXPECT_EQ(end.code(), absl::StatusCode::kNotFound);
@@ -34,7 +34,7 @@ TEST(EndOfCallTest, TheCodeAndTheMessageOfTheServerCount) {
   EXPECT_TRUE(HasReason(end, ErrorReason::kSessionNotFound));
 }
 
-TEST(EndOfCallTest, ACodeThatIsNoneDoesNot) {
+TEST(EndOfCallTest, IgnoresAnInvalidCodeInTheDetails) {
   for (const int code : {0, -1, 17, 1'000'000}) {
     const absl::Status end = EndOfCall(
         {grpc::StatusCode::INTERNAL, "broken", DetailsWith(code, ErrorReason::kInternalError)});
@@ -43,12 +43,12 @@ TEST(EndOfCallTest, ACodeThatIsNoneDoesNot) {
   }
 }
 
-TEST(EndOfCallTest, AGoodEndStaysGoodWhateverStandsBesideIt) {
+TEST(EndOfCallTest, OkStaysOkWhateverTheDetailsSay) {
   const grpc::Status odd(grpc::StatusCode::OK, "", DetailsWith(5, ErrorReason::kMeshNotFound));
   EXPECT_TRUE(EndOfCall(odd).ok());
 }
 
-TEST(EndOfCallTest, CancelledByNobodyHereIsUnavailable) {
+TEST(EndOfCallTest, RemoteCancellationIsUnavailable) {
   const absl::Status end = EndOfCall({kCut, "RST_STREAM"});
   EXPECT_EQ(end, absl::UnavailableError("RST_STREAM"));
   EXPECT_TRUE(HasReason(end, ErrorReason::kUnavailable));
@@ -63,7 +63,7 @@ TEST(EndOfCallTest, AReasonThatDoesNotFitTheCodeStays) {
   EXPECT_TRUE(HasReason(end, ErrorReason::kSessionMoved));
 }
 
-TEST(EndOfCallTest, WhatWasCancelledHereSaysSo) {
+TEST(EndOfCallTest, LocalCancellationIsReportedAsCancelled) {
   EXPECT_TRUE(absl::IsCancelled(EndOfCall({kCut, "cancelled"}, /*was_cancelled=*/true)));
   EXPECT_TRUE(absl::IsUnavailable(
       EndOfCall({grpc::StatusCode::UNAVAILABLE, "gone"}, /*was_cancelled=*/true)));

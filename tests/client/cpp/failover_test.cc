@@ -79,7 +79,7 @@ class FailoverTest : public ::testing::Test {
 const grpc::Status kLost(grpc::StatusCode::UNAVAILABLE, "the connection is gone");
 const grpc::Status kNotFound(grpc::StatusCode::NOT_FOUND, "no session");
 
-TEST_F(FailoverTest, TheServerThatAnsweredIsMeantFromThenOn) {
+TEST_F(FailoverTest, LaterCallsGoToTheServerThatAnswered) {
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   EXPECT_TRUE(client_->OpenStream(kSession, {}).ok());
@@ -87,13 +87,13 @@ TEST_F(FailoverTest, TheServerThatAnsweredIsMeantFromThenOn) {
   EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName, kOwnName, "-"));
 }
 
-TEST_F(FailoverTest, ANewSessionIsWhereItWasMade) {
+TEST_F(FailoverTest, LooksForANewSessionWhereItWasCreated) {
   EXPECT_TRUE(client_->CreateSession(SomeRequest()).ok());
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName));
 }
 
-TEST_F(FailoverTest, ASessionThatHasMovedIsAskedForWhereItIs) {
+TEST_F(FailoverTest, FollowsASessionThatHasMoved) {
   script_.Plan({MovedTo("two:1"), MovedTo("three:1")});
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1", "three:1"));
@@ -113,7 +113,7 @@ TEST_F(FailoverTest, AReadIsRepeatedWithoutTheServerThatIsGone) {
   EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName, "-", "-"));
 }
 
-TEST_F(FailoverTest, WhatMayHaveBeenDoneIsNotDoneTwice) {
+TEST_F(FailoverTest, DoesNotRepeatAnUpdateThatMayHaveHappened) {
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   script_.Plan({kLost});
   v1::UpdateSessionRequest request;
@@ -134,7 +134,7 @@ TEST_F(FailoverTest, ASessionIsMadeOnceWhenTheReplyIsLost) {
   EXPECT_NE(ids[0], "");
 }
 
-TEST_F(FailoverTest, WhatALostCallHasDeletedIsDeleted) {
+TEST_F(FailoverTest, RepeatedDeleteAfterALostReplySucceeds) {
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   script_.Plan({kLost, kNotFound});
   EXPECT_TRUE(client_->DeleteSession(kSession).ok());
@@ -165,7 +165,7 @@ TEST_F(FailoverTest, ACaseIsReadAlthoughAServerIsLostBeforeItsFirstByte) {
   EXPECT_EQ(bytes, kCaseBytes);
 }
 
-TEST_F(FailoverTest, WhatALostCallHasDeletedIsDeletedWhateverItIs) {
+TEST_F(FailoverTest, RepeatedDeleteSucceedsForEveryResourceKind) {
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   const std::vector<std::function<absl::Status()>> deletions = {
       [&] { return client_->cases().Delete(CaseName(Sha256Hex({kCaseBytes}))); },
@@ -189,7 +189,7 @@ TEST_F(FailoverTest, AnExportIsNotChangedTwice) {
   EXPECT_THAT(client_->exports().Update({}).status(), IsOk());
 }
 
-TEST_F(FailoverTest, AServerAloneIsNotAskedAgain) {
+TEST_F(FailoverTest, DoesNotRetryAStandaloneServer) {
   script_.says_name = false;
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   script_.Plan({kLost});
@@ -224,7 +224,7 @@ TEST_F(FailoverTest, ADragOutlivesItsServerAndARefusalOfTheNext) {
   drag->Cancel();
 }
 
-TEST_F(FailoverTest, WhatIsCommittedIsNotSentAgain) {
+TEST_F(FailoverTest, DoesNotResendACommittedPoseAsACommit) {
   streams_.PlanEnds({MovedTo("")});
   const auto drag = OpenDrag();
   ASSERT_NE(drag, nullptr);
@@ -236,7 +236,7 @@ TEST_F(FailoverTest, WhatIsCommittedIsNotSentAgain) {
   drag->Cancel();
 }
 
-TEST_F(FailoverTest, WhatWasNotCommittedIsSentUntilItIs) {
+TEST_F(FailoverTest, ResendsACommitUntilItIsAcknowledged) {
   streams_.commits = false;
   streams_.PlanEnds({MovedTo("")});
   const auto drag = OpenDrag();
@@ -274,7 +274,7 @@ TEST_F(FailoverTest, AWatchGoesOnWhereItsSessionIs) {
   EXPECT_THAT(script_.meant(), ElementsAre("-", "two:1"));
 }
 
-TEST_F(FailoverTest, AWatchSaysThatItShowsLessThanTheDragThatItHasSeen) {
+TEST_F(FailoverTest, WatchReportsFallingBackFromADragToACommittedPose) {
   constexpr auto kDrag = v1::WATCH_ORIGIN_DRAG;
   constexpr auto kCommitted = v1::WATCH_ORIGIN_COMMITTED;
   streams_.PlanOrigins({{v1::WATCH_ORIGIN_REST, kDrag},
@@ -308,7 +308,7 @@ class ProxiedFailoverTest : public FailoverTest,
 
 const grpc::Status kCutOff(grpc::StatusCode::UNAVAILABLE, "");
 
-TEST_P(ProxiedFailoverTest, ADragGoesOnWhereTheReasonSays) {
+TEST_P(ProxiedFailoverTest, DragContinuesOnTheServerThatTheErrorNames) {
   streams_.PlanEnds({AsProxied(MovedTo("two:1")), AsProxied(kCutOff)});
   const auto drag = OpenDrag();
   ASSERT_NE(drag, nullptr);
@@ -320,7 +320,7 @@ TEST_P(ProxiedFailoverTest, ADragGoesOnWhereTheReasonSays) {
   EXPECT_TRUE(absl::IsCancelled(drag->Finish())) << "it was";
 }
 
-TEST_P(ProxiedFailoverTest, AWatchDoesToo) {
+TEST_P(ProxiedFailoverTest, WatchContinuesOnTheServerThatTheErrorNames) {
   streams_.PlanEnds({AsProxied(MovedTo("two:1")), AsProxied(kCutOff), kNotFound});
   ASSERT_OK_AND_ASSIGN(const auto watch, ReattachingWatch::Open(client_.get(), kSession, {}));
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(watch->Receive().has_value()) << i;
@@ -337,14 +337,14 @@ TEST_P(ProxiedFailoverTest, AWatchOfExportsThatWasCutOffMayBeBegunAgain) {
   EXPECT_TRUE(IsTransient(end)) << end;
 }
 
-TEST_P(ProxiedFailoverTest, ACallThatMayBeRepeatedIs) {
+TEST_P(ProxiedFailoverTest, RepeatsAnIdempotentCall) {
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   script_.Plan({AsProxied(kCutOff)});
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   EXPECT_THAT(script_.meant(), ElementsAre("-", kOwnName, "-"));
 }
 
-TEST_P(ProxiedFailoverTest, WhatWasRefusedBeforeItBeganIsRepeatedWhateverItIs) {
+TEST_P(ProxiedFailoverTest, RepeatsAnyCallRefusedBeforeItBegan) {
   EXPECT_TRUE(client_->GetSession(kSession).ok());
   v1::UpdateSessionRequest request;
   request.set_name(kSession);
@@ -356,7 +356,7 @@ TEST_P(ProxiedFailoverTest, WhatWasRefusedBeforeItBeganIsRepeatedWhateverItIs) {
   }
 }
 
-TEST_P(ProxiedFailoverTest, WhatTheServerRefusesForGoodIsSaidAsTheServerSaidIt) {
+TEST_P(ProxiedFailoverTest, PermanentRefusalKeepsTheServersStatus) {
   script_.Plan(
       {AsProxied(RefusalFor(grpc::StatusCode::NOT_FOUND, ErrorReason::kSessionNotFound, ""))});
   const absl::Status refused = client_->GetSession(kSession).status();

@@ -94,7 +94,7 @@ TEST_F(LostAnswerTest, ACaseIsSentAgain) {
   EXPECT_EQ(interrupted_, 2);
 }
 
-TEST_F(LostAnswerTest, WhatIsLostForEverIsAnError) {
+TEST_F(LostAnswerTest, PermanentLossIsAnError) {
   meshes_.lost = 1000;
   options_.give_up_after = std::chrono::milliseconds(200);
   EXPECT_THAT(client_->UploadMesh(SingleTet(), {}, options_),

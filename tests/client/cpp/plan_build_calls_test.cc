@@ -218,7 +218,7 @@ TEST_F(PlanBuildCallsTest, ADraftIsReadWholeOrNotAtAll) {
               StatusIs(absl::StatusCode::kDataLoss, HasSubstr("damaged")));
 }
 
-TEST_F(PlanBuildCallsTest, OlderServerIsSaidToBeOlder) {
+TEST_F(PlanBuildCallsTest, ReportsAnOlderServer) {
   EXPECT_THAT(client_->cases().List().status(),
               StatusIs(absl::StatusCode::kUnimplemented, HasSubstr("this server is older than")));
 }

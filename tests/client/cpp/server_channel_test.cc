@@ -36,7 +36,7 @@ class ServerChannelTest : public ::testing::Test {
   const std::string token_ = folder_ / "token";
 };
 
-TEST_F(ServerChannelTest, OnlyWhatSaysSoIsThisMachine) {
+TEST_F(ServerChannelTest, RecognizesAddressesOfThisMachine) {
   for (const char* own : {"localhost:1", "127.0.0.1:1", "127.1.2.3:1", "[::1]:1", "unix:/a"}) {
     EXPECT_TRUE(IsLocalAddress(own)) << own;
   }
@@ -56,7 +56,7 @@ TEST_F(ServerChannelTest, ATokenNeverLeavesTheMachineUnencrypted) {
   EXPECT_THAT(Make("127.0.0.1:1", {.token_file = token_}), IsOk());
 }
 
-TEST_F(ServerChannelTest, AnotherMachineIsReachedEncryptedUnlessItIsSaid) {
+TEST_F(ServerChannelTest, RemoteServerNeedsTlsUnlessInsecureIsGiven) {
   EXPECT_THAT(Make("192.0.2.1:1", {}), StatusIs(kRefused, HasSubstr("--tls")));
   EXPECT_THAT(Make("192.0.2.1:1", {.insecure = true}), IsOk());
   EXPECT_THAT(Make("192.0.2.1:1", {.tls = true}), IsOk());

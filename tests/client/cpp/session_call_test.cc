@@ -38,7 +38,7 @@ class SessionAttemptsTest : public ::testing::Test {
   SessionRoutes routes_;
 };
 
-TEST_F(SessionAttemptsTest, AServerAloneIsAskedOnce) {
+TEST_F(SessionAttemptsTest, StandaloneServerIsAskedOnce) {
   for (const absl::Status& error :
        {absl::UnavailableError(""), absl::InternalError(""), absl::NotFoundError(""), Full(""),
         WithReason(absl::UnavailableError(""), ErrorReason::kServerDraining)}) {
@@ -46,7 +46,7 @@ TEST_F(SessionAttemptsTest, AServerAloneIsAskedOnce) {
   }
 }
 
-TEST_F(SessionAttemptsTest, TheServerThatIsNamedIsAskedAtOnceAFewTimes) {
+TEST_F(SessionAttemptsTest, FollowsANamedServerImmediatelyAFewTimes) {
   for (const absl::Status& error : {Moved("two"), Full("two")}) {
     SessionAttempts attempts = Attempts(CallRepeat::kIfNothingWasDone);
     for (int hop = 0; hop < kMaxHops; ++hop) {
@@ -57,18 +57,18 @@ TEST_F(SessionAttemptsTest, TheServerThatIsNamedIsAskedAtOnceAFewTimes) {
   }
 }
 
-TEST_F(SessionAttemptsTest, ASessionThatIsNowhereIsAskedForAtOnceAndThenAfterAWait) {
+TEST_F(SessionAttemptsTest, RetriesAnUnlocatedSessionImmediatelyAndThenWaits) {
   SessionAttempts attempts = Attempts(CallRepeat::kIfNothingWasDone);
   EXPECT_EQ(attempts.AfterError(Moved("")), kAtOnce);
   EXPECT_TRUE(Waits(attempts.AfterError(Moved(""))));
 }
 
-TEST_F(SessionAttemptsTest, WhoHasNoPatienceAsksOnceForASessionThatIsNowhere) {
+TEST_F(SessionAttemptsTest, WithoutPatienceAnUnlocatedSessionIsTriedOnce) {
   SessionAttempts attempts(&routes_, "sessions/a", CallRepeat::kAlways, kNoPatience);
   EXPECT_FALSE(attempts.AfterError(Moved("")).has_value());
 }
 
-TEST_F(SessionAttemptsTest, WhatWasNotBegunIsRepeatedAndWhatMayHaveBeenDoneIsNot) {
+TEST_F(SessionAttemptsTest, RepeatsUnstartedCallsButNotPossiblyCompletedOnes) {
   routes_.Remember("sessions/a", "one");
   for (const ErrorReason reason : {ErrorReason::kWrongNode, ErrorReason::kServerDraining}) {
     const absl::Status error = WithReason(absl::UnavailableError(""), reason);
@@ -82,7 +82,7 @@ TEST_F(SessionAttemptsTest, WhatWasNotBegunIsRepeatedAndWhatMayHaveBeenDoneIsNot
   }
 }
 
-TEST_F(SessionAttemptsTest, WhatIsRefusedIsNotRepeated) {
+TEST_F(SessionAttemptsTest, DoesNotRepeatARefusedCall) {
   routes_.Remember("sessions/a", "one");
   for (const absl::Status& error : {absl::NotFoundError(""), absl::InvalidArgumentError(""),
                                     absl::AbortedError(""), absl::DeadlineExceededError(""),

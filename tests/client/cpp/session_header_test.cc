@@ -122,7 +122,7 @@ TEST_F(SessionHeaderTest, ANewSessionIsNamedWhenTheClientHasChosenItsId) {
   EXPECT_THAT(log_.headers(), ElementsAre("-", kId));
 }
 
-TEST_F(SessionHeaderTest, ANameThatIsNoneIsNotPutIntoAHeader) {
+TEST_F(SessionHeaderTest, DoesNotPutAnInvalidNameIntoAHeader) {
   for (const std::string& name : {std::string("x"), std::string("sessions/a\nb"), std::string()}) {
     EXPECT_EQ(client_->GetSession(name).status().code(), absl::StatusCode::kNotFound) << name;
   }

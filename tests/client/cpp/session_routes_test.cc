@@ -32,7 +32,7 @@ TEST(SessionRoutesTest, TheNodeThatAnsweredLastIsRemembered) {
   EXPECT_EQ(routes.size(), 0U);
 }
 
-TEST(SessionRoutesTest, ANameThatNoHeaderWouldTakeIsNotRemembered) {
+TEST(SessionRoutesTest, DoesNotRememberANameThatIsInvalidInAHeader) {
   SessionRoutes routes;
   for (const std::string& name : {std::string(), std::string("a b"), std::string("a\nb"),
                                   std::string("a\0b", 3), std::string(65, 'a')}) {
@@ -72,7 +72,7 @@ TEST(SessionRoutesTest, AnErrorSaysWhereToGoOrThatItIsNotThere) {
   }
 }
 
-TEST(SessionRoutesTest, WhatTheServerRefusesIsStillThere) {
+TEST(SessionRoutesTest, KeepsTheRouteAfterTheServersRefusal) {
   SessionRoutes routes;
   routes.Remember("sessions/a", "one");
   for (const absl::Status& error :
@@ -83,7 +83,7 @@ TEST(SessionRoutesTest, WhatTheServerRefusesIsStillThere) {
   }
 }
 
-TEST(SessionRoutesTest, OnlyWhatMeansAnotherServerIsFollowed) {
+TEST(SessionRoutesTest, FollowsOnlyErrorsThatRedirectToAnotherServer) {
   EXPECT_EQ(NodeIn(Moved({{"node", "two"}})), "two");
   EXPECT_EQ(NodeIn(WithReason(absl::ResourceExhaustedError(""), ErrorReason::kMemoryBudgetFull,
                               {{"node", "two"}})),
@@ -94,7 +94,7 @@ TEST(SessionRoutesTest, OnlyWhatMeansAnotherServerIsFollowed) {
   EXPECT_EQ(NodeIn(absl::UnavailableError("")), "");
 }
 
-TEST(SessionRoutesTest, ManyThreadsRememberNoMoreThanIsLet) {
+TEST(SessionRoutesTest, RespectsTheLimitUnderConcurrentUse) {
   SessionRoutes routes(100);
   std::vector<std::thread> threads;
   threads.reserve(4);

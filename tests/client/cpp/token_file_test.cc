@@ -40,7 +40,7 @@ class TokenFileTest : public ::testing::Test {
   const std::filesystem::path path_ = folder_ / "token";
 };
 
-TEST_F(TokenFileTest, SpacesAroundATokenAreNone) {
+TEST_F(TokenFileTest, IgnoresWhitespaceAroundAToken) {
   Write(" a.b-c_d~e+f/g=\n");
   ASSERT_OK_AND_ASSIGN(const auto file, TokenFile::Open(path_));
   EXPECT_EQ(file->Current(), "a.b-c_d~e+f/g=");

@@ -30,14 +30,14 @@ TEST_F(AccessRulesTest, TheListenAddressLoopbackAndAllowedNamesAreHosts) {
   }
 }
 
-TEST_F(AccessRulesTest, OtherNamesAreNoHosts) {
+TEST_F(AccessRulesTest, RefusesOtherHostNames) {
   for (const char* host : {"evil.example", "localhost.evil.example", "", "[::1", "::1",
                            "evil.example:planner.example.org", "192.0.2.70"}) {
     EXPECT_FALSE(rules_.AllowsHost(Asked(host))) << host;
   }
 }
 
-TEST_F(AccessRulesTest, OneHostIsSaid) {
+TEST_F(AccessRulesTest, RequiresExactlyOneHostHeader) {
   HttpHead head = Asked("localhost");
   head.fields.emplace_back("host", "localhost");
   EXPECT_FALSE(rules_.AllowsHost(head));

@@ -30,7 +30,7 @@ TEST(CallMetadata, OnlyOurMethodsAndHealthAreServed) {
   EXPECT_FALSE(IsServedMethod("/tissueform.v1.S/" + std::string(300, 'a')));
 }
 
-TEST(CallMetadata, WhatBrowsersSendBesideIsLeftOut) {
+TEST(CallMetadata, OmitsOtherBrowserHeaders) {
   const HttpHead head = {.method = "POST",
                          .target = "/x",
                          .fields = {{"cookie", "secret"},
@@ -46,7 +46,7 @@ TEST(CallMetadata, WhatBrowsersSendBesideIsLeftOut) {
   EXPECT_EQ(MetadataOf(head), expected);
 }
 
-TEST(CallMetadata, WhatWouldEndTheProcessIsRefused) {
+TEST(CallMetadata, RefusesValuesThatWouldAbortTheProcess) {
   EXPECT_THAT(CheckMetadata({{"authorization", "Bearer ~ !"}}), IsOk());
   for (const std::string& value :
        {std::string("a\nb"), std::string("\xc3\xa9"), std::string("a\0b", 3), std::string("\x7f"),
@@ -68,7 +68,7 @@ TEST(CallMetadata, TheLongestTimeoutIsAYear) {
   EXPECT_EQ(*ParseGrpcTimeout("99999999H"), std::chrono::hours(365 * 24));
 }
 
-TEST(CallMetadata, WhatIsNoTimeoutIsRefused) {
+TEST(CallMetadata, RefusesInvalidTimeouts) {
   for (const char* text : {"", "S", "1", "-1S", "+1S", "1.5S", "123456789S", "1s", " 1S", "1S "}) {
     EXPECT_EQ(ParseGrpcTimeout(text).status().code(), absl::StatusCode::kInvalidArgument) << text;
   }

@@ -16,15 +16,15 @@ HttpHead From(const std::string& peer, const std::vector<std::string>& forwarded
 
 const ForwardedAddresses kBehindTwo({"192.0.2.1", "2001:db8::1"});
 
-TEST(ForwardedAddressesTest, NobodyIsTrustedWithoutANamedProxy) {
+TEST(ForwardedAddressesTest, IgnoresTheHeaderWithoutATrustedProxy) {
   EXPECT_EQ(ForwardedAddresses().Of(From("192.0.2.1", {"198.51.100.7"})), "192.0.2.1");
 }
 
-TEST(ForwardedAddressesTest, OfAStrangerTheHeaderDoesNotCount) {
+TEST(ForwardedAddressesTest, IgnoresTheHeaderOfAnUntrustedPeer) {
   EXPECT_EQ(kBehindTwo.Of(From("192.0.2.9", {"198.51.100.7"})), "192.0.2.9");
 }
 
-TEST(ForwardedAddressesTest, WhatATrustedProxyHasAddedCountsAndNothingBeforeIt) {
+TEST(ForwardedAddressesTest, UsesOnlyTheAddressAddedByTheTrustedProxy) {
   EXPECT_EQ(kBehindTwo.Of(From("192.0.2.1", {"10.0.0.1, 198.51.100.7"})), "198.51.100.7");
   EXPECT_EQ(kBehindTwo.Of(From("192.0.2.1", {"10.0.0.1", "198.51.100.7"})), "198.51.100.7");
 }
@@ -34,7 +34,7 @@ TEST(ForwardedAddressesTest, TrustedProxiesMayStandInARow) {
             "198.51.100.7");
 }
 
-TEST(ForwardedAddressesTest, WhatIsNoAddressEndsTheChain) {
+TEST(ForwardedAddressesTest, InvalidAddressEndsTheChain) {
   for (const char* text : {"", "unknown", "198.51.100.7:80", "198.51.100.7, "}) {
     EXPECT_EQ(kBehindTwo.Of(From("192.0.2.1", {text})), "192.0.2.1") << text;
   }

@@ -22,7 +22,7 @@ constexpr char kWebEndless[] = "/tissueform.v1.CaseService/ReadCase";
 
 using GatewayHttpTest = GatewayTest;
 
-TEST_F(GatewayHttpTest, ReadinessIsThatOfTheServer) {
+TEST_F(GatewayHttpTest, ReadinessFollowsTheServer) {
   const auto ready = [this] { return StatusOf(Ask(port(), "GET /readyz HTTP/1.1")); };
   EXPECT_TRUE(Becomes([&] { return ready() == 200; }));
   server_.SetServing(false);
@@ -139,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
                 400, GatewayEvent::kMalformedRequest}),
     [](const auto& test) { return std::string(test.param.name); });
 
-TEST_F(GatewayHttpTest, AHeaderThatDoesNotEndIsGivenUp) {
+TEST_F(GatewayHttpTest, ClosesTheConnectionOnAnUnfinishedHeader) {
   GatewayLimits limits;
   limits.header_deadline = std::chrono::seconds(1);
   Restart(limits);
@@ -149,7 +149,7 @@ TEST_F(GatewayHttpTest, AHeaderThatDoesNotEndIsGivenUp) {
   EXPECT_TRUE(Becomes([&] { return Count(GatewayEvent::kTooSlow) == 1; }));
 }
 
-TEST_F(GatewayHttpTest, ABodyThatDoesNotComeIsGivenUp) {
+TEST_F(GatewayHttpTest, ClosesTheConnectionOnAMissingBody) {
   GatewayLimits limits;
   limits.body_deadline = std::chrono::seconds(1);
   Restart(limits);
@@ -185,7 +185,7 @@ TEST_F(GatewayHttpTest, AnswersAndTrailersComeInTheBody) {
   EXPECT_THAT(reply, Not(HasSubstr("secret")));
 }
 
-TEST_F(GatewayHttpTest, AnOldClientGetsItUntilTheEndOfTheConnection) {
+TEST_F(GatewayHttpTest, Http10ReplyEndsWithTheConnection) {
   const std::string body = WebBody("abc");
   const std::string reply =
       Ask(port(), absl::StrCat("POST ", kWebEcho, " HTTP/1.0"),
@@ -207,7 +207,7 @@ TEST_F(GatewayHttpTest, AnErrorWithoutAnAnswerIsInTheHeader) {
   EXPECT_EQ(reply.find(node), reply.rfind(node));
 }
 
-TEST_F(GatewayHttpTest, OnlyWhatIsAllowedReachesTheServer) {
+TEST_F(GatewayHttpTest, ForwardsOnlyAllowedHeaders) {
   const std::string reply =
       AskWeb(port(), "/tissueform.v1.SessionService/GetSession", WebBody(""),
              "authorization: Bearer token\r\ncookie: c=1\r\nx-tissueform-session: sessions/1\r\n");
@@ -222,7 +222,7 @@ TEST_F(GatewayHttpTest, MetadataThatGrpcDoesNotTakeIsRefused) {
   EXPECT_EQ(Count(GatewayEvent::kMetadataRefused), 1);
 }
 
-TEST_F(GatewayHttpTest, FramesThatAreNoneAreRefused) {
+TEST_F(GatewayHttpTest, RefusesMalformedFrames) {
   for (const std::string& body : {std::string(), std::string("abc"), WebBody("abc") + "d",
                                   std::string("\x80\0\0\0\0", 5), WebBody("") + WebBody("")}) {
     EXPECT_THAT(AskWeb(port(), kWebEcho, body), HasSubstr("grpc-status: 3\r\n"));
@@ -241,7 +241,7 @@ TEST_F(GatewayHttpTest, LongLivedCallsAreReferredToTheWebSocket) {
   EXPECT_EQ(Count(GatewayEvent::kMethodRefused), 5);
 }
 
-TEST_F(GatewayHttpTest, TheDeadlineIsTheClients) {
+TEST_F(GatewayHttpTest, UsesTheClientsDeadline) {
   EXPECT_THAT(AskWeb(port(), kWebSilent, WebBody(""), "grpc-timeout: 1m\r\n"),
               HasSubstr("grpc-status: 4\r\n"));
   EXPECT_THAT(AskWeb(port(), kWebSilent, WebBody(""), "grpc-timeout: soon\r\n"),

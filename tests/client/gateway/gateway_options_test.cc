@@ -44,7 +44,7 @@ TEST(GatewayOptions, ItsServerHasOneAddress) {
   EXPECT_EQ(Parse("--server [::1]:1").options.server, "[::1]:1");
 }
 
-TEST(GatewayOptions, SeveralServersAreHaproxys) {
+TEST(GatewayOptions, SuggestsHaproxyForSeveralServers) {
   for (const char* text : {"--server a:1 --server b:2", "--server a:1 unix:/b",
                            "--server left=a:1 --server right=b:1", "--server left=a:1"}) {
     const std::string error = Parse(text).error;
@@ -54,7 +54,7 @@ TEST(GatewayOptions, SeveralServersAreHaproxys) {
   }
 }
 
-TEST(GatewayOptions, WhatIsNotAnAddressIsRefused) {
+TEST(GatewayOptions, RefusesAnInvalidServerAddress) {
   EXPECT_NE(Parse("").error, "");
   for (const char* text : {"a", ":1", "a:0", "a:65536", "a:b", "http://127.0.0.1:1", "a/b:1"}) {
     EXPECT_THAT(Parse(std::string("--server ") + text).error, HasSubstr("give HOST:PORT")) << text;
@@ -84,7 +84,7 @@ TEST(GatewayOptions, LimitsAreInTheUnitsOfTheirNames) {
   }
 }
 
-TEST(GatewayOptions, EveryOptionStandsInTheDocument) {
+TEST(GatewayOptions, EveryOptionIsDocumented) {
   std::ifstream file(testing::SourcePath("docs/gateway.md"));
   const std::string document(std::istreambuf_iterator<char>(file), {});
   CLI::App app;

@@ -157,7 +157,7 @@ TEST_F(GatewaySocketTest, MetadataAndDeadlineGoAlong) {
   EXPECT_EQ(late.ReceiveEnd().code(), 4);
 }
 
-TEST_F(GatewaySocketTest, AMessageInFragmentsIsOne) {
+TEST_F(GatewaySocketTest, JoinsTheFragmentsOfAMessage) {
   RawSocket socket(port());
   socket.Start(kEcho);
   const std::string frame = OurFrame(SocketFrameKind::kMessage, "abc");
@@ -180,7 +180,7 @@ TEST_F(GatewaySocketTest, TheLargestMessageIsTakenAndALargerOneIsNot) {
 }
 
 // Lengths are what a client says: nothing is made as large as that.
-TEST_F(GatewaySocketTest, AFrameThatSaysItIsHugeIsRefusedWhenItHasBecomeTooLarge) {
+TEST_F(GatewaySocketTest, RefusesAHugeFrameOnceTheReceivedDataIsTooLarge) {
   GatewayLimits limits;
   limits.message_bytes = 100'000;
   Restart(limits);
@@ -215,7 +215,7 @@ std::string StartOfCall(const std::string& method) {
 class BadSocketTest : public GatewaySocketTest,
                       public ::testing::WithParamInterface<BadSequence> {};
 
-TEST_P(BadSocketTest, EndsTheCallWithAWord) {
+TEST_P(BadSocketTest, EndsTheCallWithAnErrorStatus) {
   RawSocket socket(port());
   for (const std::string& message : GetParam().messages) socket.SendBinary(message);
   ExpectRefused(&socket, GetParam().code, "", 1002, GetParam().event);

@@ -17,7 +17,7 @@
 namespace tissueform {
 namespace {
 
-TEST(MethodTable, CallsThatEndByThemselvesGoOverGrpcWeb) {
+TEST(MethodTable, UnaryCallsAndDownloadsUseGrpcWeb) {
   EXPECT_EQ(KindOf("/tissueform.v1.MeshService/GetMesh"), MethodKind::kUnary);
   EXPECT_EQ(KindOf("/tissueform.v1.AccessService/WhoAmI"), MethodKind::kUnary);
   EXPECT_EQ(KindOf("/grpc.health.v1.Health/Check"), MethodKind::kUnary);
@@ -28,7 +28,7 @@ TEST(MethodTable, CallsThatEndByThemselvesGoOverGrpcWeb) {
   }
 }
 
-TEST(MethodTable, OthersAndUnknownOnesDoNot) {
+TEST(MethodTable, OtherAndUnknownMethodsDoNotUseGrpcWeb) {
   for (const char* method :
        {"/tissueform.v1.DeformService/Deform", "/tissueform.v1.DeformService/Watch",
         "/tissueform.v1.SessionService/PrepareSession", "/tissueform.v1.MeshService/UploadMesh",
@@ -77,7 +77,7 @@ TEST(MethodTable, MessagesWithoutBytesHaveNoPlace) {
   EXPECT_EQ(LongestBytes("", *v1::DeformResponse::descriptor()).size, 0U);
 }
 
-TEST(MethodTable, WhatIsNoMessageHasNoPlace) {
+TEST(MethodTable, MalformedMessageYieldsNoPlaceOutsideIt) {
   v1::DeformResponse response;
   response.mutable_frame()->set_positions(std::string(300, 'p'));
   const std::string bytes = response.SerializeAsString();

@@ -104,7 +104,7 @@ TEST(SocketFrames, AStartIsUnderstood) {
   EXPECT_FALSE(ParseStart(Start().SerializeAsString())->timeout.has_value());
 }
 
-TEST(SocketFrames, AStartThatAsksForMoreIsRefused) {
+TEST(SocketFrames, RefusesAStartWithAForeignMethodOrMetadata) {
   v1::GatewayCallStart start = Start();
   start.set_method("/other.Service/Method");
   EXPECT_THAT(ParseStart(start.SerializeAsString()).status(),
@@ -151,7 +151,7 @@ TEST(SocketFrames, PositionsLieAtMultiplesOfFour) {
   }
 }
 
-TEST(SocketFrames, WithoutATypeNothingIsLookedFor) {
+TEST(SocketFrames, MessageWithoutATypeHasNoBytesPlace) {
   const auto frame = MessageFrame(Buffer("abc"), nullptr);
   ASSERT_TRUE(frame.ok());
   EXPECT_EQ(frame->substr(32), "abc");
@@ -159,12 +159,12 @@ TEST(SocketFrames, WithoutATypeNothingIsLookedFor) {
   EXPECT_EQ(NumberAt(*frame, 12), 0U);
 }
 
-TEST(SocketFrames, AHeartbeatIsAHead) {
+TEST(SocketFrames, HeartbeatConsistsOfAHeadOnly) {
   const std::string frame = HeartbeatFrame();
   EXPECT_EQ(frame, std::string("\x01\x06\x20", 3) + std::string(kSocketFrameHeadBytes - 3, '\0'));
 }
 
-TEST(SocketFrames, AnEndSaysAllOfIt) {
+TEST(SocketFrames, EndCarriesStatusDetailsAndTrailers) {
   const std::string frame =
       EndFrame({.status = grpc::Status(grpc::StatusCode::NOT_FOUND, "gone", "details"),
                 .trailers = {{"x-tissueform-node", "a"}}});

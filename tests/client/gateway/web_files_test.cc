@@ -50,7 +50,7 @@ std::string FieldOf(const HttpReply& reply, const std::string& name) {
   return "";
 }
 
-TEST_F(WebFilesTest, TheRootIsTheIndexWhichIsAskedForAgain) {
+TEST_F(WebFilesTest, RootServesTheIndexWithoutCaching) {
   const HttpReply reply = Load().Reply("/", "");
   EXPECT_EQ(reply.status, 200);
   EXPECT_EQ(*reply.body, "<!doctype html>");
@@ -58,14 +58,14 @@ TEST_F(WebFilesTest, TheRootIsTheIndexWhichIsAskedForAgain) {
   EXPECT_EQ(FieldOf(reply, "cache-control"), "no-cache");
 }
 
-TEST_F(WebFilesTest, NamesWithAHashAreKeptForEver) {
+TEST_F(WebFilesTest, HashedNamesAreImmutable) {
   const WebFiles files = Load();
   EXPECT_THAT(FieldOf(files.Reply("/assets/index-B7sKq2aZ.js", ""), "cache-control"),
               HasSubstr("immutable"));
   EXPECT_EQ(FieldOf(files.Reply("/assets/plain.css", ""), "cache-control"), "no-cache");
 }
 
-TEST_F(WebFilesTest, WhatTheClientHasIsNotSentAgain) {
+TEST_F(WebFilesTest, DoesNotResendAnUnchangedFile) {
   const WebFiles files = Load();
   const std::string etag = FieldOf(files.Reply("/", ""), "etag");
   const HttpReply again = files.Reply("/", "\"other\", " + etag);
@@ -76,7 +76,7 @@ TEST_F(WebFilesTest, WhatTheClientHasIsNotSentAgain) {
   EXPECT_NE(FieldOf(files.Reply("/assets/plain.css", ""), "etag"), etag);
 }
 
-TEST_F(WebFilesTest, NothingElseIsThere) {
+TEST_F(WebFilesTest, ServesNoOtherFiles) {
   Write("../outside.txt", "secret");
   Write(".hidden", "secret");
   Write(".git/config", "secret");
@@ -93,7 +93,7 @@ TEST_F(WebFilesTest, NothingElseIsThere) {
   std::filesystem::remove(folder_ / "../outside.txt");
 }
 
-TEST_F(WebFilesTest, AFolderWithoutAnIndexIsNone) {
+TEST_F(WebFilesTest, RefusesAFolderWithoutAnIndex) {
   std::filesystem::remove(folder_ / "index.html");
   EXPECT_THAT(WebFiles::Load(folder_.string()).status(),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("index.html")));

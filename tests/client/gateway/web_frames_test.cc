@@ -90,7 +90,7 @@ TEST(WebFrames, MessagesAreAsciiWithoutPercent) {
               ElementsAre(Pair("grpc-status", "10"), Pair("grpc-message", "5 %25%0A%C3%A9")));
 }
 
-TEST(WebFrames, AGoodEndSaysNoMore) {
+TEST(WebFrames, SuccessfulEndHasOnlyTheStatusField) {
   EXPECT_THAT(WebEndFields({.status = grpc::Status::OK}), ElementsAre(Pair("grpc-status", "0")));
 }
 

@@ -89,7 +89,7 @@ TEST_F(AtomicFolderTest, EmptyFolderIsReplacedAndAFullOneIsNot) {
   EXPECT_THAT(Names(), ElementsAre("goal"));
 }
 
-TEST_F(AtomicFolderTest, GoalThatWasFilledMeanwhileIsKept) {
+TEST_F(AtomicFolderTest, KeepsATargetThatWasFilledInTheMeantime) {
   {
     ASSERT_OK_AND_ASSIGN(AtomicFolder folder, AtomicFolder::Create(Path("goal")));
     fs::create_directory(around_ / "goal");

@@ -46,7 +46,7 @@ TEST(BackoffTest, ASessionThatMovesIsAskedForAFewTimesASecond) {
   }
 }
 
-TEST(BackoffTest, WhatWasLostWaitsLonger) {
+TEST(BackoffTest, WaitsLongerAfterALossThanForAMove) {
   Backoff backoff(Exact());
   for (int i = 0; i < 20; ++i) backoff.After(kLost);
   EXPECT_EQ(backoff.After(kLost), Exact().most);

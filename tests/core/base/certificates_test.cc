@@ -53,13 +53,13 @@ TEST_F(CertificatesTest, AnExpiredCertificateIsRefusedWithItsDate) {
               StatusIs(kInvalid, AllOf(HasSubstr("expired on 20"), HasSubstr("UTC"))));
 }
 
-TEST_F(CertificatesTest, ACertificateOfTomorrowIsRefused) {
+TEST_F(CertificatesTest, RefusesACertificateThatIsNotYetValid) {
   const TestIdentity identity = authority_.Issue({.begins = hours(24), .ends = hours(48)});
   EXPECT_THAT(CheckIdentity(identity.certificate, identity.key, kNow),
               StatusIs(kInvalid, HasSubstr("valid from")));
 }
 
-TEST_F(CertificatesTest, WhatIsNoPemIsRefused) {
+TEST_F(CertificatesTest, RefusesTextThatIsNotPem) {
   const TestIdentity identity = authority_.Issue();
   EXPECT_THAT(CheckIdentity("nonsense", identity.key, kNow),
               StatusIs(kInvalid, HasSubstr("no certificate in PEM")));
@@ -113,7 +113,7 @@ TEST_F(CertificatesTest, TlsFilesAreReadAndCheckedByName) {
   std::filesystem::remove_all(folder);
 }
 
-TEST_F(CertificatesTest, AKeyThatEverybodyMayReadIsRefused) {
+TEST_F(CertificatesTest, RefusesAWorldReadableKey) {
   const std::filesystem::path folder = EmptyTestFolder("secret");
   const TestFiles files = authority_.IssueFiles(folder, "server");
   EXPECT_THAT(ReadSecretPemFile(files.key), IsOk());

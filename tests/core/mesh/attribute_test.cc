@@ -37,7 +37,7 @@ TEST(AttributeTest, TheErrorOfAMissingArrayListsTheExistingOnes) {
   EXPECT_EQ(FindAttribute(TwoArrays(), "tissue"), nullptr);
 }
 
-TEST(AttributeTest, AnArrayOfThreeComponentsIsNoScalar) {
+TEST(AttributeTest, RefusesAThreeComponentArrayAsScalars) {
   EXPECT_THAT(FindScalars(TwoArrays(), "normal", "point"),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("3 components")));
 }

@@ -71,7 +71,7 @@ TEST_F(NearbyTrianglesTest, NearestIsThatOfAllTriangles) {
   EXPECT_GT(found, 100);
 }
 
-TEST_F(NearbyTrianglesTest, FarOutsideThereIsNone) {
+TEST_F(NearbyTrianglesTest, FindsNothingFarOutside) {
   const NearbyTriangles nearby(positions_, triangles_, kReachMm);
   for (const double far : {100.0, 1e6, 1e12, -1e12}) {
     EXPECT_FALSE(nearby.Nearest({far, 0, 0}, Vector3d::UnitX()).has_value());
@@ -79,7 +79,7 @@ TEST_F(NearbyTrianglesTest, FarOutsideThereIsNone) {
   }
 }
 
-TEST_F(NearbyTrianglesTest, ASurfaceWithoutTrianglesHasNone) {
+TEST_F(NearbyTrianglesTest, FindsNothingOnASurfaceWithoutTriangles) {
   const TriangleIndices none(0, 3);
   const NearbyTriangles nearby(positions_, none, kReachMm);
   EXPECT_FALSE(nearby.Nearest(Vector3d::Zero(), Vector3d::UnitX()).has_value());

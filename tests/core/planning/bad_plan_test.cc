@@ -31,7 +31,7 @@ auto IsRefused(const std::string& why) {
                   AllOf(HasSubstr("plan plan.json: "), HasSubstr(why), Not(HasSubstr("\n"))));
 }
 
-TEST(BadPlanTest, UnknownKeyIsNamedWithWhatIsAllowed) {
+TEST(BadPlanTest, UnknownKeyIsNamedWithTheAllowedKeys) {
   EXPECT_THAT(Parse(PlanWith("/modle", "arap")),
               IsRefused("unknown key \"modle\" at /; allowed there: coord"));
   EXPECT_THAT(Parse(PlanWith("/handles/0/pose/scal", 1)),
@@ -61,7 +61,7 @@ TEST(BadPlanTest, WrongTypeIsNamedWithTheRightOne) {
   EXPECT_THAT(ParseText("[]"), IsRefused("wrong type at /: [] must be an object"));
 }
 
-TEST(BadPlanTest, FixedWordsOfTheFormatAreDemanded) {
+TEST(BadPlanTest, RequiresTheFixedWordsOfTheFormat) {
   EXPECT_THAT(Parse(PlanWith("/version", 5)),
               IsRefused("wrong value at /version: 5 must be 1 to 4"));
   EXPECT_THAT(Parse(PlanWith("/format", "plan")), IsRefused("wrong value at /format"));
@@ -73,7 +73,7 @@ TEST(BadPlanTest, FixedWordsOfTheFormatAreDemanded) {
               IsRefused("\"spring\" must be \"gradient_field\" or"));
 }
 
-TEST(BadPlanTest, RangesOfTheMaterialThatAreNoneAreRefused) {
+TEST(BadPlanTest, RefusesInvalidMaterialRanges) {
   const auto with = [](const nlohmann::json& uncertainty) {
     nlohmann::json plan = PlanWith("/uncertainty", uncertainty);
     plan["version"] = 2;
@@ -147,7 +147,7 @@ TEST(BadPlanTest, LabelsOfStiffnessAreWholeNumbers) {
   EXPECT_THAT(with_label("99999999999999999999", 5), IsRefused("99999999999999999999"));
 }
 
-TEST(BadPlanTest, WhatIsNoJsonIsRefusedWithItsPlace) {
+TEST(BadPlanTest, InvalidJsonIsRefusedWithItsPlace) {
   EXPECT_THAT(ParseText(""), IsRefused("not valid JSON"));
   EXPECT_THAT(ParseText("{\n  \"unit\": mm}"), IsRefused("line 2"));
   EXPECT_THAT(ParseText(GoodPlan().dump() + "x"), IsRefused("not valid JSON"));

@@ -151,7 +151,7 @@ TEST(FitTargetsTest, MistakesAreNamedInOneLine) {
               StatusIs(kInvalid, HasSubstr("no point array skin_region")));
 }
 
-TEST(FitTargetsTest, TextsThatAreNoJsonOrNoNumbersAreRefused) {
+TEST(FitTargetsTest, RefusesInvalidJsonAndInvalidNumbers) {
   const PlanProblem problem = BarProblem(CoordinateSystem::kLps);
   std::string text = Targets().dump();
   EXPECT_THAT(ParseFitTargets(text + "x", "t.json", problem),
@@ -191,7 +191,7 @@ TEST(FitTargetsTest, PlanWithPosesKeepsAllElse) {
   EXPECT_EQ(written, plan);
 }
 
-TEST(FitTargetsTest, PlanWithPosesDropsWhatThePlannerSaysOfTheOldPoses) {
+TEST(FitTargetsTest, PlanWithPosesDropsMeasurementsOfTheOldPoses) {
   const Json plan = testing::GoodPlan();
   Json exported = plan;
   exported["version"] = 3;

@@ -67,7 +67,7 @@ TEST_F(PlanFolderTest, MeshThroughDotsOrAnAbsolutePathIsRefused) {
   EXPECT_THAT(Read("/etc/passwd"), IsOutside());
 }
 
-TEST_F(PlanFolderTest, FolderWhoseNameOnlyBeginsAlikeIsOutside) {
+TEST_F(PlanFolderTest, FolderWithTheSamePrefixIsOutside) {
   std::filesystem::create_directory(root_ / "plan2");
   std::ofstream(root_ / "plan2" / "a.vtu") << "mesh";
   EXPECT_THAT(Read("../plan2/a.vtu"), IsOutside());

@@ -172,7 +172,7 @@ TEST_F(PlanResolverTest, BoxTheWrongWayRoundIsRefused) {
               IsRefused("min above max"));
 }
 
-TEST_F(PlanResolverTest, ArrayThatTheMeshHasNotIsNamedWithThoseItHas) {
+TEST_F(PlanResolverTest, MissingArrayIsNamedWithTheExistingOnes) {
   EXPECT_THAT(Resolve(PlanWith("/fixed", {{"point_data", "anatmy"}, {"equals", 1}})),
               IsRefused("no point array \"anatmy\"; it has anatomy, wide"));
   EXPECT_THAT(Resolve(PlanWith("/fixed", {{"point_data", "wide"}, {"equals", 0}})),
@@ -333,7 +333,7 @@ TEST_F(TissueRangesTest, OneFactorIsThatOfEveryTissueByItself) {
   EXPECT_EQ(ranges.tissue_of_tet.front(), 1);
 }
 
-TEST_F(TissueRangesTest, WhatDoesNotFitTheMeshIsNamed) {
+TEST_F(TissueRangesTest, NamesRangesThatDoNotFitTheMesh) {
   EXPECT_THAT(
       Ranges({{"youngs_modulus_factor_95", {{"by_cell_data", "part"}, {"values", {{"1", 2}}}}}}),
       IsRefused("has part = 2, which has no factor; add it to values"));

@@ -47,7 +47,7 @@ TEST(WeldedSeamTest, TheMeshIsThatBeforeTheCutToTheLastBit) {
   EXPECT_EQ(welded.cell_data[0].values, whole.cell_data[0].values);
 }
 
-TEST(WeldedSeamTest, WhatIsNotDoubledStays) {
+TEST(WeldedSeamTest, MeshWithoutDoubledVerticesIsUnchanged) {
   const TetMesh whole = PartedBlock::Whole();
   std::vector<ContactRow> rows = PartedBlock::Slides();
   rows.push_back({.vertex = 20, .other = 23, .normal = Eigen::Vector3d::UnitY(), .gap_mm = 1});

@@ -54,7 +54,7 @@ TEST(AnswerConversionTest, EveryReasonToGiveUpSurvivesTheJourney) {
   }
 }
 
-TEST(AnswerConversionTest, AReasonOfALaterServerIsNone) {
+TEST(AnswerConversionTest, IgnoresAnUnknownReasonOfALaterServer) {
   v1::SolveSummary proto;
   proto.set_gave_up(static_cast<v1::GaveUp>(99));
   EXPECT_EQ(ToSolveSummary(proto).gave_up, Termination::kConverged);

@@ -20,13 +20,13 @@ using ::tissueform::testing::IsOk;
 using ::tissueform::testing::kInvalid;
 using ::tissueform::testing::StatusIs;
 
-TEST(CaseNameTest, GoesThereAndBack) {
+TEST(CaseNameTest, RoundTrips) {
   const std::string sha256(64, 'a');
   EXPECT_EQ(CaseName(sha256), "cases/" + sha256);
   EXPECT_EQ(*ParseCaseName(CaseName(sha256)), sha256);
 }
 
-TEST(CaseNameTest, NothingElseIsOne) {
+TEST(CaseNameTest, RefusesOtherNames) {
   for (const std::string& name :
        {std::string(), std::string("cases/"), std::string(64, 'a'), "cases/" + std::string(64, 'A'),
         "cases/" + std::string(63, 'a'), "meshes/" + std::string(64, 'a'),
@@ -42,7 +42,7 @@ TEST(TitleTest, IsTextOfSomeLength) {
   EXPECT_THAT(CheckTitle("123456789", 8), StatusIs(kInvalid, HasSubstr("9 bytes")));
 }
 
-TEST(TitleTest, CommandsToATerminalAreNone) {
+TEST(TitleTest, RefusesControlCharacters) {
   for (const char* title : {"a\nDoe", "\x1b[2J Doe", "Doe\x7f", "Doe \xc2\x9b 2J"}) {
     EXPECT_THAT(CheckTitle(title, 256),
                 StatusIs(kInvalid, AllOf(HasSubstr("control character"), Not(HasSubstr("Doe")))));

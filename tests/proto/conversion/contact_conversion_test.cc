@@ -65,7 +65,7 @@ TEST(ContactConversionTest, WithoutRowsARequestIsAsBefore) {
   EXPECT_EQ(cleared.SerializeAsString(), before);
 }
 
-TEST(ContactConversionTest, ARowThatDoesNotSayWhatItTouchesIsNamed) {
+TEST(ContactConversionTest, NamesARowWithoutAContactPartner) {
   const auto refused = [](auto change, const std::string& why) {
     ContactRowProtos rows = ToProto({{.vertex = 4}, {.vertex = 5, .handle = 0}}, kHandles);
     change(rows[1]);

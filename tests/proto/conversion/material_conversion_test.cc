@@ -29,7 +29,7 @@ TEST(MaterialConversionTest, RangesComeBack) {
   EXPECT_EQ(*ToMaterialUncertainty(ToProto(of_stiffness), 3, 0.45), of_stiffness);
 }
 
-TEST(MaterialConversionTest, RangesThatAreNoneAreRefused) {
+TEST(MaterialConversionTest, RefusesInvalidRanges) {
   const auto refused = [](const v1::MaterialRanges& proto, const char* why) {
     EXPECT_THAT(ToMaterialUncertainty(proto, 3, 0.45),
                 StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(why)));

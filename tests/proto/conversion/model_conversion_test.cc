@@ -26,13 +26,13 @@ TEST(ModelConversionTest, EveryModelSurvivesTheJourney) {
   }
 }
 
-TEST(ModelConversionTest, AModelThatIsLeftOpenIsTheOther) {
+TEST(ModelConversionTest, UnspecifiedModelIsTheFallback) {
   ASSERT_OK_AND_ASSIGN(const DeformationModel model,
                        ToModel(v1::DEFORMATION_MODEL_UNSPECIFIED, DeformationModel::kArap));
   EXPECT_EQ(model, DeformationModel::kArap);
 }
 
-TEST(ModelConversionTest, SettingsThatAreLeftOpenAreTheDefaults) {
+TEST(ModelConversionTest, UnspecifiedSettingsAreTheDefaults) {
   ASSERT_OK_AND_ASSIGN(const GradientFieldOptions options, ToGradientFieldOptions({}, 1000));
   const GradientFieldOptions defaults;
   EXPECT_EQ(options.rotation, defaults.rotation);
@@ -42,7 +42,7 @@ TEST(ModelConversionTest, SettingsThatAreLeftOpenAreTheDefaults) {
   EXPECT_EQ(options.tolerance_mm, defaults.tolerance_mm);
 }
 
-TEST(ModelConversionTest, WhatIsUnknownOrTooMuchIsRefusedByName) {
+TEST(ModelConversionTest, RefusesUnknownOrExcessiveSettingsByName) {
   EXPECT_THAT(ToModel(static_cast<v1::DeformationModel>(9), DeformationModel::kArap),
               StatusIs(kInvalid, HasSubstr("model 9")));
   v1::GradientFieldSettings settings;

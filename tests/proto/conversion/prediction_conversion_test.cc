@@ -13,7 +13,7 @@
 namespace tissueform::testing {
 namespace {
 
-TEST(PredictionConversionTest, NamesThereAndBackAndNoOthers) {
+TEST(PredictionConversionTest, NamesRoundTripAndOthersAreRefused) {
   ASSERT_OK_AND_ASSIGN(const std::string id, ParsePredictionName(PredictionName("ab-12")));
   EXPECT_EQ(id, "ab-12");
   for (const std::string& name :
@@ -23,7 +23,7 @@ TEST(PredictionConversionTest, NamesThereAndBackAndNoOthers) {
   }
 }
 
-TEST(PredictionConversionTest, StatisticsThereAndBack) {
+TEST(PredictionConversionTest, StatisticsRoundTrip) {
   const DistanceSummary summary = {
       .count = 7, .mean_mm = 1.5, .p50_mm = 1, .p90_mm = 2, .p95_mm = 3, .max_mm = 4};
   const DistanceSummary back = ToDistanceSummary(ToProto(summary));

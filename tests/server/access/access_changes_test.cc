@@ -65,7 +65,7 @@ TEST_F(AccessChangesTest, OnlyTheOwnerShares) {
   EXPECT_THAT(*changes_.SharesOf(ann_, "sessions/s"), SizeIs(1));
 }
 
-TEST_F(AccessChangesTest, WhatIsNoNameIsRefused) {
+TEST_F(AccessChangesTest, RefusesInvalidNames) {
   for (const char* resource :
        {"", "sessions", "session/s", "meshes/x", "projects/", "sessions/\n"}) {
     EXPECT_THAT(Share(ann_, resource, "bob"), StatusIs(Code::kInvalidArgument)) << resource;
@@ -76,7 +76,7 @@ TEST_F(AccessChangesTest, WhatIsNoNameIsRefused) {
   EXPECT_THAT(Share(ann_, "sessions/none", "bob"), StatusIs(Code::kNotFound));
 }
 
-TEST_F(AccessChangesTest, AShareThatIsTakenBackIsAwayAtOnce) {
+TEST_F(AccessChangesTest, RemovedShareIsGoneAtOnce) {
   ASSERT_THAT(Share(ann_, "sessions/s", "bob", ShareRole::kPlanner), IsOk());
   EXPECT_THAT(access_.RecheckSessionAccess(bob_, "s", Permission::kWrite), IsOk());
   ASSERT_THAT(changes_.Unshare(ann_, "sessions/s", "bob"), IsOk());
@@ -109,7 +109,7 @@ TEST_F(AccessChangesTest, ASessionTakesItsSharesAndLinksWithIt) {
   EXPECT_THAT(access_.FindLink("1").status(), StatusIs(Code::kUnauthenticated));
 }
 
-TEST_F(AccessChangesTest, LinksAreTakenBackByWhoMayDrag) {
+TEST_F(AccessChangesTest, OnlyPrincipalsWhoMayDragCanRevokeLinks) {
   ASSERT_THAT(Link(bob_, "1"), StatusIs(Code::kNotFound));
   ASSERT_THAT(Share(ann_, "sessions/s", "bob"), IsOk());
   ASSERT_THAT(Link(bob_, "1"), StatusIs(Code::kPermissionDenied));
@@ -119,7 +119,7 @@ TEST_F(AccessChangesTest, LinksAreTakenBackByWhoMayDrag) {
   EXPECT_THAT(access_.FindLink("1").status(), StatusIs(Code::kUnauthenticated));
 }
 
-TEST_F(AccessChangesTest, AMeshIsOfWhoHasSentItUntilItGoes) {
+TEST_F(AccessChangesTest, MeshBelongsToItsSendersUntilItIsRemoved) {
   const std::string mesh(64, 'b');
   ASSERT_THAT(changes_.GrantMesh(bob_, mesh, 100), IsOk());
   EXPECT_THAT(access_.CheckMeshAccess(bob_, mesh, Permission::kOwner), IsOk());

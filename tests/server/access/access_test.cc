@@ -117,7 +117,7 @@ class AccessTest : public ::testing::Test {
   AccessChanges changes_{{}, &store_, &access_};
 };
 
-TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
+TEST_F(AccessTest, BridgeSeesOnlyTheContentsOfExports) {
   const Principal bridge{.name = "bridge", .roles = {"bridge"}};
   const auto looks = [&](const Principal& caller) {
     return access_.CheckPredictionAccess(caller, "q", Permission::kRead).ok() &&
@@ -146,7 +146,7 @@ TEST_F(AccessTest, ABridgeLooksAtWhatAnExportHoldsAndAtNothingElse) {
 }
 
 // Whose prediction it is must be let look at the case.
-TEST_F(AccessTest, WhoNamesAnothersCaseDoesNotOpenItToABridge) {
+TEST_F(AccessTest, ExportOfAForeignCaseDoesNotRevealItToABridge) {
   const Principal bridge{.name = "bridge", .roles = {"bridge"}};
   PredictionRecord foreign;
   foreign.id = "b";
@@ -160,7 +160,7 @@ TEST_F(AccessTest, WhoNamesAnothersCaseDoesNotOpenItToABridge) {
   EXPECT_THAT(access_.CheckCaseAccess(bridge, kCase, Permission::kRead), IsOk());
 }
 
-TEST_F(AccessTest, ExportsAreAnsweredByBridgesAlone) {
+TEST_F(AccessTest, OnlyBridgesMayUpdateExports) {
   const Principal bridge{.name = "bridge", .roles = {"bridge"}};
   EXPECT_THAT(Access::CheckMethodAccess(bridge, "ExportService.UpdateExport"), IsOk());
   EXPECT_THAT(Access::CheckMethodAccess(nobody_, "ExportService.UpdateExport"), IsOk());
@@ -176,14 +176,14 @@ TEST_F(AccessTest, ExportsAreAnsweredByBridgesAlone) {
   EXPECT_EQ(Access::CheckExportAccess(bob_, "ann", none, Permission::kRead), none);
 }
 
-TEST_F(AccessTest, OnesOwnIsOnesOwn) {
+TEST_F(AccessTest, OwnersHaveFullAccess) {
   EXPECT_THAT(access_.CheckSessionAccess(ann_, "s", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckPredictionAccess(ann_, "q", Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckCaseAccess(ann_, kCase, Permission::kOwner), IsOk());
   EXPECT_THAT(access_.CheckMeshAccess(ann_, kMesh, Permission::kRead), IsOk());
 }
 
-TEST_F(AccessTest, AnothersAnswersAsWhatIsNotThere) {
+TEST_F(AccessTest, ForeignResourcesLookLikeMissingOnes) {
   const std::string none(64, 'f');
   const auto same_but_for_the_name = [](const absl::Status& foreign, const absl::Status& missing,
                                         const std::string& name, const std::string& other) {
@@ -205,7 +205,7 @@ TEST_F(AccessTest, AnothersAnswersAsWhatIsNotThere) {
   }
 }
 
-TEST_F(AccessTest, WhatSomebodyHasIsNothingForThoseWithoutAName) {
+TEST_F(AccessTest, AnonymousCallersSeeNoOwnedResources) {
   EXPECT_THAT(access_.CheckSessionAccess(nobody_, "s", Permission::kRead),
               StatusIs(Code::kNotFound));
   EXPECT_THAT(access_.CheckPredictionAccess(nobody_, "q", Permission::kRead),
@@ -213,7 +213,7 @@ TEST_F(AccessTest, WhatSomebodyHasIsNothingForThoseWithoutAName) {
   EXPECT_EQ(access_.CheckCaseAccess(nobody_, kCase, Permission::kRead)->owner, "");
 }
 
-TEST_F(AccessTest, WithoutLoginsWhatNobodyHasIsEverybodys) {
+TEST_F(AccessTest, UnownedResourcesAreOpenToAnonymousCallers) {
   SessionRecord session;
   session.id = "t";
   session.mesh_sha256 = std::string(64, 'a');
@@ -244,7 +244,7 @@ TEST_F(AccessTest, AViewerLooksAndAPlannerDrags) {
   EXPECT_THAT(*access_.SharedSessions(ann_), IsEmpty()) << "they are her own";
 }
 
-TEST_F(AccessTest, AShareOfAProjectIsOneOfAllThatItsOwnerHasInIt) {
+TEST_F(AccessTest, ProjectShareCoversAllResourcesOfItsOwnerInIt) {
   ASSERT_THAT(Share("projects/p", "bob", ShareRole::kPlanner), IsOk());
   EXPECT_THAT(access_.CheckSessionAccess(bob_, "s", Permission::kWrite), IsOk());
   ASSERT_OK_AND_ASSIGN(const CaseKey found,
@@ -260,7 +260,7 @@ TEST_F(AccessTest, AShareOfAProjectIsOneOfAllThatItsOwnerHasInIt) {
       << "another's project of this name";
 }
 
-TEST_F(AccessTest, ACaseOfOnesOwnComesBeforeOneThatIsShared) {
+TEST_F(AccessTest, OwnCaseTakesPrecedenceOverASharedOne) {
   ASSERT_THAT(Share("cases/" + kCase, "bob"), IsOk());
   EXPECT_EQ(access_.CheckCaseAccess(bob_, kCase, Permission::kRead)->owner, "ann");
   EXPECT_THAT(access_.CheckCaseAccess(bob_, kCase, Permission::kOwner),
@@ -270,7 +270,7 @@ TEST_F(AccessTest, ACaseOfOnesOwnComesBeforeOneThatIsShared) {
   EXPECT_THAT(*access_.SharedCases(bob_), IsEmpty()) << "one a name";
 }
 
-TEST_F(AccessTest, AnIdThatAnotherTakesAgainOpensNoPredictionOfItsFirstOwner) {
+TEST_F(AccessTest, ReusedIdDoesNotRevealThePreviousOwnersPrediction) {
   ASSERT_THAT(DeleteSession(stores_->sessions(), "s"), IsOk());
   SessionRecord session;
   session.id = "s";
@@ -281,7 +281,7 @@ TEST_F(AccessTest, AnIdThatAnotherTakesAgainOpensNoPredictionOfItsFirstOwner) {
               StatusIs(Code::kNotFound));
 }
 
-TEST_F(AccessTest, ALinkFollowsItsSessionReadsItsCaseAndNothingElse) {
+TEST_F(AccessTest, LinkReachesOnlyItsSessionAndCase) {
   const Principal link{.name = "link:s", .only_session = "sessions/s"};
   EXPECT_THAT(access_.CheckSessionAccess(link, "s", Permission::kRead),
               StatusIs(Code::kUnauthenticated))
@@ -305,7 +305,7 @@ TEST_F(AccessTest, ALinkFollowsItsSessionReadsItsCaseAndNothingElse) {
   EXPECT_THAT(access_.FindLink("d").status(), StatusIs(Code::kUnauthenticated));
 }
 
-TEST_F(AccessTest, ALinkEndsWhenItsMakerMayDragNoMore) {
+TEST_F(AccessTest, LinkEndsWhenItsCreatorMayNoLongerDrag) {
   ASSERT_THAT(Share("sessions/s", "bob", ShareRole::kPlanner), IsOk());
   ASSERT_THAT(changes_.AddLink(bob_, {.digest = "d", .session = "s", .expires_s = now_s_ + 100}),
               IsOk());
@@ -314,7 +314,7 @@ TEST_F(AccessTest, ALinkEndsWhenItsMakerMayDragNoMore) {
   EXPECT_THAT(access_.FindLink("d").status(), StatusIs(Code::kUnauthenticated));
 }
 
-TEST_F(AccessTest, ALinkCallsWhatAFollowerNeedsAndAPublisherUploadsCases) {
+TEST_F(AccessTest, LinkMayCallFollowerMethodsAndPublisherMayUpload) {
   const Principal link{.name = "link:s", .only_session = "sessions/s"};
   EXPECT_THAT(Access::CheckMethodAccess(link, "DeformService.Watch"), IsOk());
   EXPECT_THAT(Access::CheckMethodAccess(link, "CaseService.ReadCase"), IsOk());
@@ -330,7 +330,7 @@ TEST_F(AccessTest, ALinkCallsWhatAFollowerNeedsAndAPublisherUploadsCases) {
       IsOk());
 }
 
-TEST_F(AccessTest, WhatIsKeptCountsForItsOwner) {
+TEST_F(AccessTest, StoredDataCountsTowardsItsOwnersQuota) {
   access_.set_most_bytes(100);
   ASSERT_OK_AND_ASSIGN(const auto holdings, access_.HoldingsByOwner());
   const auto bytes = static_cast<int64_t>(kCaseBytes.size());
@@ -352,7 +352,7 @@ TEST_F(AccessTest, OnlyAProjectOfTheTokenTakesNewResources) {
               StatusIs(Code::kInvalidArgument));
 }
 
-TEST_F(AccessTest, WhileTheDatabaseIsAwayWhoWasThereGoesOnAndNobodyElse) {
+TEST_F(AccessTest, DatabaseOutageKeepsOnlyRecentlyCheckedAccess) {
   AwayDatabase database(&stores_->database());
   AccessQueries queries(&database);
   Access access(&queries);

@@ -66,7 +66,7 @@ TEST_F(LinkAuthenticatorTest, ATokenIsLongRandomAndSafeInAUrl) {
   EXPECT_NE(NewLinkToken(), token_);
 }
 
-TEST_F(LinkAuthenticatorTest, AGoodLinkIsItsSessionsAndEndsInTime) {
+TEST_F(LinkAuthenticatorTest, ValidLinkIsBoundToItsSessionAndExpires) {
   ASSERT_OK_AND_ASSIGN(const Authenticated link, Come("Bearer " + token_));
   EXPECT_EQ(link.principal->name, "link:s");
   EXPECT_EQ(link.principal->only_session, "sessions/s");
@@ -78,13 +78,13 @@ TEST_F(LinkAuthenticatorTest, AGoodLinkIsItsSessionsAndEndsInTime) {
   EXPECT_THAT(Come("Bearer " + token_), StatusIs(Code::kUnauthenticated));
 }
 
-TEST_F(LinkAuthenticatorTest, ALinkThatWasTakenBackIsNoMoreGood) {
+TEST_F(LinkAuthenticatorTest, RevokedLinkIsNoLongerValid) {
   ASSERT_OK_AND_ASSIGN(const Authenticated link, Come("bearer " + token_));
   ASSERT_THAT(changes_.RemoveLinks({.name = "ann"}, "s"), IsOk());
   EXPECT_THAT(links_.IsStillAuthorized(link), StatusIs(Code::kUnauthenticated));
 }
 
-TEST_F(LinkAuthenticatorTest, WhatLooksLikeALinkIsOneOrNothing) {
+TEST_F(LinkAuthenticatorTest, RefusesInvalidLinkTokens) {
   EXPECT_THAT(Come("Bearer " + NewLinkToken()), StatusIs(Code::kUnauthenticated));
   EXPECT_THAT(Come("Bearer " + token_ + "x"), StatusIs(Code::kUnauthenticated));
   EXPECT_THAT(Come("Bearer tfl_"), StatusIs(Code::kUnauthenticated));
@@ -92,7 +92,7 @@ TEST_F(LinkAuthenticatorTest, WhatLooksLikeALinkIsOneOrNothing) {
               StatusIs(Code::kUnauthenticated));
 }
 
-TEST_F(LinkAuthenticatorTest, AllOthersAreTheOtherAuthenticators) {
+TEST_F(LinkAuthenticatorTest, PassesOtherTokensToTheNextAuthenticator) {
   EXPECT_EQ(Come("Bearer eyJhbGciOi")->principal->name, "ann");
   EXPECT_EQ(links_.Authenticate({})->principal->name, "ann");
   const std::string header = "Bearer " + token_;

@@ -74,7 +74,7 @@ TEST(NumberOptionsTest, NamesAreUnique) {
   }
 }
 
-TEST(NumberOptionsTest, HalfOfTheBudgetIsTheQuotaOfWhoeverHasNone) {
+TEST(NumberOptionsTest, MemoryQuotaDefaultsToHalfOfTheBudget) {
   ServerOptions options;
   options.memory_budget_bytes = 100;
   EXPECT_THAT(LimitsOf(options), Contains(Pair("quota_memory_bytes", 50)));

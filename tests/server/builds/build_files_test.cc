@@ -89,7 +89,7 @@ TEST_F(BuildFilesTest, OtherBytesAreDropped) {
   EXPECT_EQ(CountFiles(), 0);
 }
 
-TEST_F(BuildFilesTest, AnotherPrincipalBeginsAtNothing) {
+TEST_F(BuildFilesTest, AnotherPrincipalStartsFromZero) {
   ASSERT_OK_AND_ASSIGN(const BuildFileRecord file, files_->Begin(Announce()));
   ASSERT_THAT(files_->Append(file, 0, bytes_), IsOk());
   EXPECT_THAT(files_->Find("bob", sha256()), StatusIs(Code::kNotFound));
@@ -99,7 +99,7 @@ TEST_F(BuildFilesTest, AnotherPrincipalBeginsAtNothing) {
   EXPECT_THAT(files_->Find("ann", sha256()), IsOk());
 }
 
-TEST_F(BuildFilesTest, AnAdoptedFileIsTheOwnFileOfWhoAdopts) {
+TEST_F(BuildFilesTest, AdoptedFileBelongsToItsAdopter) {
   ASSERT_OK_AND_ASSIGN(const BuildFileRecord file, files_->Begin(Announce()));
   EXPECT_THAT(files_->Adopt("ann", sha256(), "bob"), StatusIs(Code::kFailedPrecondition));
   ASSERT_THAT(files_->Append(file, 0, bytes_), IsOk());
@@ -114,7 +114,7 @@ TEST_F(BuildFilesTest, AnAdoptedFileIsTheOwnFileOfWhoAdopts) {
   EXPECT_THAT(files_->OpenWhole("ann", sha256()), StatusIs(Code::kNotFound));
 }
 
-TEST_F(BuildFilesTest, AnAdoptedFileReplacesAnUploadThatBrokeOff) {
+TEST_F(BuildFilesTest, AdoptedFileReplacesAnInterruptedUpload) {
   ASSERT_OK_AND_ASSIGN(const BuildFileRecord of_bob, files_->Begin(Announce("bob")));
   ASSERT_THAT(files_->Append(of_bob, 0, "broken"), IsOk());
   ASSERT_OK_AND_ASSIGN(const BuildFileRecord file, files_->Begin(Announce()));
@@ -129,7 +129,7 @@ TEST_F(BuildFilesTest, AnAdoptedFileReplacesAnUploadThatBrokeOff) {
   EXPECT_EQ(*opened.Size(), static_cast<int64_t>(bytes_.size()));
 }
 
-TEST_F(BuildFilesTest, WhatIsNoInputIsRefused) {
+TEST_F(BuildFilesTest, RefusesInvalidInputFiles) {
   BuildFileRecord dicom = Announce();
   dicom.suffix = ".dcm";
   EXPECT_THAT(files_->Begin(dicom), StatusIs(Code::kInvalidArgument, HasSubstr("DICOM")));
@@ -173,7 +173,7 @@ TEST_F(BuildFilesTest, FilesGoWhenTheirTimeIsOver) {
   EXPECT_THAT(files_->Find("bob", sha256()), IsOk());
 }
 
-TEST_F(BuildFilesTest, WhatIsDamagedOnTheDiskIsBegunAnew) {
+TEST_F(BuildFilesTest, RemovesADamagedUploadOnOpening) {
   ASSERT_THAT(files_->Begin(Announce()), IsOk());
   for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
     if (entry.path().extension() == ".about") std::ofstream(entry.path()) << "damaged";

@@ -178,7 +178,7 @@ class DraftsTest : public PlanBuildsTest {
   }
 };
 
-TEST_F(PlanBuildsTest, OneAfterTheOtherInTheirOrder) {
+TEST_F(PlanBuildsTest, RunsOneAtATimeInOrder) {
   const std::string first = Create("first");
   const std::string second = Create("second", "bob");
   const std::string third = Create("third");
@@ -231,7 +231,7 @@ TEST_F(PlanBuildsTest, AFailureSaysWhyAndLeavesNothing) {
   EXPECT_FALSE(std::filesystem::exists(absl::StrCat(folder_, "/plans/", bad, "/work")));
 }
 
-TEST_F(PlanBuildsTest, CancellingEndsWhatWaitsAndWhatRuns) {
+TEST_F(PlanBuildsTest, CancelsWaitingAndRunningBuilds) {
   const std::string running = Create("running");
   const std::string waiting = Create("waiting");
   WaitFor(running, v1::PLAN_BUILD_STATE_RUNNING);
@@ -244,7 +244,7 @@ TEST_F(PlanBuildsTest, CancellingEndsWhatWaitsAndWhatRuns) {
   EXPECT_THAT(builds_->Find("ann", running), StatusIs(Code::kNotFound));
 }
 
-TEST_F(PlanBuildsTest, NobodyElseHearsOfABuild) {
+TEST_F(PlanBuildsTest, HidesABuildFromOtherPrincipals) {
   const std::string id = Create("first");
   for (const absl::Status& status :
        {builds_->Find("bob", id).status(), builds_->Cancel("bob", id).status(),
@@ -308,7 +308,7 @@ TEST_F(PlanBuildsTest, PagesHoldEachBuildOnce) {
 
 // What was promised survives any number of ends at any time: each build ends once, in a state that
 // follows, and none that succeeded is built again.
-TEST_F(PlanBuildsTest, NothingIsLostOrBuiltTwiceOverManyEnds) {
+TEST_F(PlanBuildsTest, LosesAndRepeatsNoBuildOverManyRestarts) {
   limits_.max_waiting = 1'000;
   limits_.max_waiting_of_principal = 1'000;
   limits_.max_per_day = 1'000;
@@ -387,7 +387,7 @@ TEST_F(DraftsTest, ADraftNeedsAWholeFileOfItsOwner) {
               StatusIs(Code::kFailedPrecondition, HasSubstr("0 of 9 bytes")));
 }
 
-TEST_F(DraftsTest, TheQuotaCountsWhatWaits) {
+TEST_F(DraftsTest, QuotaCountsOnlyWaitingDrafts) {
   limits_.max_drafts_of_principal = 1;
   Open();
   const v1::BuildDraft draft = Draft();
@@ -472,7 +472,7 @@ TEST_F(DraftsTest, RemovingItRemovesItsCt) {
   EXPECT_TRUE(drafts_->List().empty());
 }
 
-TEST_F(DraftsTest, DamagedRecordsAreNoDrafts) {
+TEST_F(DraftsTest, IgnoresDamagedRecords) {
   const v1::BuildDraft draft = Draft();
   std::ofstream(folder_ + "/drafts/" + IdOf(draft)) << "damaged";
   Open();

@@ -52,7 +52,7 @@ class ClusterDragTest : public ClusterTest {
   std::unique_ptr<FrozenProxy> proxy_;
 };
 
-TEST_F(ClusterDragTest, WhatOneNodeHoldsTheOthersDoNotAnswerAndTheySayWhoDoes) {
+TEST_F(ClusterDragTest, OtherNodesRedirectToTheHolderOfASession) {
   const std::string session = MakeSession(a_, 1);
   RawDrag drag(a_, session);
   ASSERT_TRUE(drag.Send(1));
@@ -72,7 +72,7 @@ TEST_F(ClusterDragTest, WhatOneNodeHoldsTheOthersDoNotAnswerAndTheySayWhoDoes) {
   EXPECT_THAT(AskOnce(b_, session, 4), StatusIs(Code::kNotFound));
 }
 
-TEST_F(ClusterDragTest, WhenTheHolderIsCutOffItStopsAnsweringAndAnotherGoesOnFromWhatWasKept) {
+TEST_F(ClusterDragTest, IsolatedHolderStopsAndAnotherNodeContinues) {
   StartCutOff();
   const std::string session = MakeSession(a_, 1);
   RawDrag drag(a_, session);
@@ -129,7 +129,7 @@ TEST_F(ClusterDragTest, ADrainedNodeGivesItsSessionsToTheOthersAtOnce) {
             0);
 }
 
-TEST_F(ClusterDragTest, WhatAnotherHasTakenOverWhoHeldItDoesNotAnswerAnyMore) {
+TEST_F(ClusterDragTest, FormerHolderStopsAnsweringAfterATakeover) {
   const std::string session = MakeSession(a_, 1);
   EXPECT_THAT(AskOnce(a_, session, 1), IsOk());
   RunSql("UPDATE session_states SET lease_until = '-infinity';");

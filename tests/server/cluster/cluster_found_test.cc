@@ -193,7 +193,7 @@ TEST_F(ClusterFoundTest, AMeshThatAnotherNodeHasMadeASessionOfIsNotDeleted) {
   EXPECT_THAT(AskOnce(b_, session, 1), IsOk());
 }
 
-TEST_F(ClusterFoundTest, WhereThereIsNoRoomTheNodeThatHasSomeIsNamed) {
+TEST_F(ClusterFoundTest, FullNodeNamesANodeWithRoom) {
   ServerOptions small = NodeOptions("small");
   small.memory_budget_bytes = 1 << 20;
   small.quotas.memory_bytes = 1 << 30;

@@ -69,7 +69,7 @@ class ClusterStartTest : public ClusterTest {
   }
 };
 
-TEST_F(ClusterStartTest, ADatabaseBesideAFolderOrMemoryIsRefused) {
+TEST_F(ClusterStartTest, RefusesADatabaseTogetherWithAFolderOrMemory) {
   ServerOptions options = NodeOptions("c");
   options.in_memory = true;
   EXPECT_THAT(StartOf(options), StatusIs(Code::kInvalidArgument, HasSubstr("--store")));
@@ -78,7 +78,7 @@ TEST_F(ClusterStartTest, ADatabaseBesideAFolderOrMemoryIsRefused) {
   EXPECT_THAT(StartOf(options), StatusIs(Code::kInvalidArgument, HasSubstr("--store")));
 }
 
-TEST_F(ClusterStartTest, ADatabaseThatIsAwayIsWaitedForAndNotForever) {
+TEST_F(ClusterStartTest, WaitsALimitedTimeForAnUnavailableDatabase) {
   ServerOptions options = NodeOptions("c");
   options.cluster.store = "postgresql://postgres@127.0.0.1:1/postgres";
   options.cluster.start_patience = std::chrono::milliseconds(700);
@@ -172,7 +172,7 @@ TEST_F(ClusterStartTest, ANodeThatWasKilledDoesNotKeepItsName) {
   }
 }
 
-TEST_F(ClusterStartTest, ANodeSaysItsNameAndRefusesWhatIsMeantForAnother) {
+TEST_F(ClusterStartTest, NodeStatesItsNameAndRefusesCallsForAnother) {
   const std::string session = MakeSession(a_, 1);
   v1::GetSessionRequest get;
   get.set_name(session);
@@ -208,7 +208,7 @@ TEST_F(ClusterStartTest, TheMetricsPageReportsLeases) {
   }
 }
 
-TEST_F(ClusterStartTest, ANodeThatWasCutOffFromTheDatabaseServesOnWhenItIsBack) {
+TEST_F(ClusterStartTest, NodeResumesServingWhenTheDatabaseReturns) {
   a_ = {};
   FrozenProxy proxy(TestDatabasePort());
   ServerOptions options = NodeOptions("a");

@@ -82,7 +82,7 @@ class ExportQueueTest : public ::testing::Test {
   std::unique_ptr<ExportQueue> book_;
 };
 
-TEST_F(ExportQueueTest, AnotherBookOfTheStoreKnowsTheSame) {
+TEST_F(ExportQueueTest, ReopenedQueueKnowsTheSameExports) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p", "ann", "key"));
   ASSERT_OK_AND_ASSIGN(const ExportRecord changed,
                        book_->Update(made.id, {.state = ExportState::kStored}));
@@ -105,7 +105,7 @@ TEST_F(ExportQueueTest, OpeningRemovesExportsWhosePredictionsAreGone) {
   EXPECT_THAT(Predictions({}), ElementsAre("q")) << "of the store, too";
 }
 
-TEST_F(ExportQueueTest, NothingIsTheresThatWasNotKept) {
+TEST_F(ExportQueueTest, ShowsNothingThatWasNotStored) {
   store_.broken = true;
   EXPECT_THAT(Ask("p"), StatusIs(Code::kResourceExhausted));
   EXPECT_THAT(Predictions({}), IsEmpty());
@@ -173,7 +173,7 @@ TEST_F(ExportQueueTest, TheChangeCallbackFindsAWithdrawalWithoutTheStore) {
   EXPECT_THAT(found, StatusIs(Code::kNotFound));
 }
 
-TEST_F(ExportQueueTest, AWithdrawnExportOpensNothingEvenIfTheDiskFails) {
+TEST_F(ExportQueueTest, WithdrawnExportGrantsNoAccessEvenIfTheDiskFails) {
   ASSERT_OK_AND_ASSIGN(const ExportRecord made, Ask("p"));
   store_.broken = true;
   EXPECT_THAT(book_->Remove(made.id), StatusIs(Code::kResourceExhausted));
@@ -208,7 +208,7 @@ TEST_F(ExportQueueTest, IdsRiseThoughTheClockGoesBack) {
   EXPECT_EQ(Predictions({.after = page.next, .limit = 2}), std::vector<std::string>({"d", "e"}));
 }
 
-TEST_F(ExportQueueTest, OneOwnersWaitingOnesLeaveRoomForOthers) {
+TEST_F(ExportQueueTest, WaitingExportsOfOneOwnerLeaveRoomForOthers) {
   limits_ = {.max_waiting = 3, .max_waiting_of_principal = 2};
   Open();
   ASSERT_THAT(Ask("p"), IsOk());

@@ -90,7 +90,7 @@ class ConnectionListenerTest : public ::testing::Test {
   std::vector<int> taken_ ABSL_GUARDED_BY(mutex_);
 };
 
-TEST_F(ConnectionListenerTest, TurnsAwayWhatIsTooMuchAndTakesOthersOnceThereIsRoom) {
+TEST_F(ConnectionListenerTest, RefusesExcessConnectionsUntilThereIsRoom) {
   Start(20, 20);
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(IsTaken()) << i;
   for (int i = 0; i < 100; ++i) ASSERT_FALSE(IsTaken()) << i;
@@ -99,7 +99,7 @@ TEST_F(ConnectionListenerTest, TurnsAwayWhatIsTooMuchAndTakesOthersOnceThereIsRo
   EXPECT_FALSE(IsTaken());
 }
 
-TEST_F(ConnectionListenerTest, WhatIsWrittenGoesOutAtOnce) {
+TEST_F(ConnectionListenerTest, SetsNoDelayOnConnections) {
   Start(1, 1);
   ASSERT_TRUE(IsTaken());
   MutexLock lock(mutex_);

@@ -55,7 +55,7 @@ TEST_F(ConnectionTableTest, AClosedConnectionLeavesItsPlaceAlsoWhenItsNumberIsUs
   }
 }
 
-TEST_F(ConnectionTableTest, ADescriptorThatBecameAnotherFileIsNoConnection) {
+TEST_F(ConnectionTableTest, IgnoresADescriptorThatBecameAnotherFile) {
   for (int i = 0; i < 2; ++i) EXPECT_EQ(table_.Take(Socket(), "a"), Verdict::kTaken);
   ASSERT_EQ(dup2(STDERR_FILENO, open_.front()), open_.front());
   EXPECT_EQ(table_.Take(Socket(), "a"), Verdict::kTaken);

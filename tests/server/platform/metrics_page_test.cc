@@ -76,7 +76,7 @@ TEST(MetricsPageTest, ServesTheTextAndNothingElse) {
   EXPECT_THAT(HttpGet(page.port(), "/../../etc/passwd"), Not(HasSubstr("root:")));
 }
 
-TEST(MetricsPageTest, IsReachedByLoopbackAlone) {
+TEST(MetricsPageTest, ListensOnLoopbackOnly) {
   MetricsPage page;
   ASSERT_THAT(page.Serve(0), IsOk());
   EXPECT_THAT(HttpGet(page.port(), "/metrics", "127.0.0.1"), HasSubstr("200 OK"));

@@ -13,7 +13,7 @@ TEST(NetworkAddressTest, AddressesAreWrittenInOneForm) {
   EXPECT_EQ(AddressOr("2001:DB8:0::1"), "2001:db8::1");
 }
 
-TEST(NetworkAddressTest, WhatIsNoAddressIsNone) {
+TEST(NetworkAddressTest, RefusesInvalidAddresses) {
   for (const char* text : {"", "192.0.2", "192.0.2.1:80", "[::1]", "a name", "1.2.3.4\n",
                            "192.0.2.1, 192.0.2.2", "::ffff:::"}) {
     EXPECT_EQ(AddressOr(text), "") << text;

@@ -84,7 +84,7 @@ TEST_F(ProgramOptionsTest, TheCommandLineWinsOverTheEnvironmentAndThatOverTheFil
   EXPECT_EQ(Parse({"--config", file, "--port", "3"}).settings.port, 3);
 }
 
-TEST_F(ProgramOptionsTest, AnEmptyVariableSaysNothing) {
+TEST_F(ProgramOptionsTest, IgnoresAnEmptyVariable) {
   const ScopedEnvironment variable("PROGRAM_TEST_PORT", "");
   EXPECT_EQ(Parse({"--config", File("port = 1\n")}).settings.port, 1);
 }
@@ -96,7 +96,7 @@ TEST_F(ProgramOptionsTest, AVariableMayNameTheFile) {
   EXPECT_EQ(Parse({}).end, 2);
 }
 
-TEST_F(ProgramOptionsTest, AFlagThatSaysNoIsNotGiven) {
+TEST_F(ProgramOptionsTest, FalseFlagCountsAsNotGiven) {
   const std::string file = File("quiet = false\nfolder = /a\n");
   EXPECT_EQ(Parse({"--config", file}).settings.folder, "/a");
   EXPECT_TRUE(Parse({"--config", File("quiet = true\n")}).settings.quiet);
@@ -145,7 +145,7 @@ INSTANTIATE_TEST_SUITE_P(
                       BadFile{"NoNumber", "port = many\n", "--port"}),
     [](const auto& param) { return std::string(param.param.name); });
 
-TEST_F(ProgramOptionsTest, WhatIsPrintedReadsBackAsTheSame) {
+TEST_F(ProgramOptionsTest, PrintedConfigReadsBackUnchanged) {
   for (const std::string& folder :
        {std::string("/var/lib/a b"), std::string("a, b"), std::string("it's"), std::string("\"x\""),
         std::string("[1"), std::string("a;b=c"), std::string(" ")}) {
@@ -161,7 +161,7 @@ TEST_F(ProgramOptionsTest, WhatIsPrintedReadsBackAsTheSame) {
   }
 }
 
-TEST_F(ProgramOptionsTest, WhatNoFileCanHoldIsAComment) {
+TEST_F(ProgramOptionsTest, ValuesThatAFileCannotHoldBecomeComments) {
   for (const char* folder : {"a#b", "a\nport = 1", "'\"", "a`b"}) {
     const Outcome printed = Parse({"--print-config", "--folder", folder});
     EXPECT_THAT(printed.out, HasSubstr("# folder has a character"));

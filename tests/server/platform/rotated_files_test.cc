@@ -53,7 +53,7 @@ TEST_F(RotatedFilesTest, ARewrittenPairIsTakenIntoUse) {
   EXPECT_FALSE(files->alarm());
 }
 
-TEST_F(RotatedFilesTest, NonsenseRaisesAnAlarmAndWhatIsGoodAgainEndsIt) {
+TEST_F(RotatedFilesTest, InvalidFileRaisesAnAlarmUntilAValidOneArrives) {
   ASSERT_OK_AND_ASSIGN(const auto files, Load());
   const auto first = files->expiry();
   WriteTestFile(files_.key, "nonsense");

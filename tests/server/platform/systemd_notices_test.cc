@@ -57,13 +57,13 @@ TEST_F(SystemdNoticesTest, ReportsReadinessAndTheEnd) {
   EXPECT_EQ(NextNotice(), "STOPPING=1");
 }
 
-TEST_F(SystemdNoticesTest, TheWatchdogIsFedByEveryAnswer) {
+TEST_F(SystemdNoticesTest, EveryAnswerNotifiesTheWatchdog) {
   const ScopedEnvironment interval("WATCHDOG_USEC", "4000");
   const SystemdWatchdog watchdog([](const std::function<void()>& answered) { answered(); });
   for (int i = 0; i < 5; ++i) EXPECT_EQ(NextNotice(), "WATCHDOG=1");
 }
 
-TEST_F(SystemdNoticesTest, AProgramThatDoesNotAnswerIsNotSaidToLive) {
+TEST_F(SystemdNoticesTest, UnresponsiveProgramDoesNotNotifyTheWatchdog) {
   const ScopedEnvironment interval("WATCHDOG_USEC", "4000");
   std::promise<std::function<void()>> first;
   std::promise<void> second;
@@ -83,7 +83,7 @@ TEST_F(SystemdNoticesTest, AProgramThatDoesNotAnswerIsNotSaidToLive) {
   EXPECT_EQ(NextNotice(MSG_DONTWAIT), "");
 }
 
-TEST_F(SystemdNoticesTest, NobodyIsAskedWhereNobodyWaits) {
+TEST_F(SystemdNoticesTest, DoesNothingWithoutAWatchdog) {
   const ScopedEnvironment interval("WATCHDOG_USEC", nullptr);
   bool asked = false;
   {

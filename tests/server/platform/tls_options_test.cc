@@ -33,7 +33,7 @@ TEST(TlsOptionsTest, OffLoopbackBothAreNeeded) {
   }
 }
 
-TEST(TlsOptionsTest, InsecureIsSaidAloud) {
+TEST(TlsOptionsTest, InsecureOptionAllowsExposure) {
   EXPECT_THAT(CheckExposure("0.0.0.0", {.insecure = true}, false), IsOk());
 }
 

@@ -146,7 +146,7 @@ TEST_F(CaseUploadStreamTest, AnEndAtAnyChunkLeavesNothing) {
   SendAll(Code::OK);
 }
 
-TEST_F(CaseUploadStreamTest, WhatIsNoUploadIsRefused) {
+TEST_F(CaseUploadStreamTest, RefusesInvalidUploads) {
   const auto refused = [&](const std::vector<v1::UploadCaseRequest>& messages, Code code,
                            const std::string& why) {
     CaseCall upload(reactions_.get(), &service_);
@@ -245,7 +245,7 @@ TEST_F(CaseUploadStreamTest, NoMoreThanTheLimitAreReceivedAtATimeAndPlacesAreGiv
   }
 }
 
-TEST_F(CaseUploadStreamTest, OfManyCallsAtOnceNoBytesMix) {
+TEST_F(CaseUploadStreamTest, DoesNotMixBytesOfConcurrentCalls) {
   std::vector<std::unique_ptr<CaseCall>> uploads;
   for (int i = 0; i < 8; ++i) {
     uploads.push_back(Begin());
@@ -257,7 +257,7 @@ TEST_F(CaseUploadStreamTest, OfManyCallsAtOnceNoBytesMix) {
   EXPECT_EQ(*(*store_.Open({sha256_}, 0))->Read(0, 10'000), bytes_);
 }
 
-TEST_F(CaseUploadStreamTest, ASilentOneEnds) {
+TEST_F(CaseUploadStreamTest, SilentUploadEnds) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(20);
   CaseService service(&gate_, impatient, &no_logins_.access, &store_, workers_.get(), &timer_);
@@ -325,7 +325,7 @@ TEST_F(ReadCaseTest, APartComesInChunksThatFollowEachOther) {
   EXPECT_TRUE(status_.ok());
 }
 
-TEST_F(ReadCaseTest, WhatIsNoPartIsRefused) {
+TEST_F(ReadCaseTest, RefusesInvalidParts) {
   for (const int64_t offset : {int64_t{-1}, int64_t{10'001}, INT64_MIN, INT64_MAX}) {
     EXPECT_EQ(Read(offset, 0), "");
     EXPECT_EQ(status_.error_code(), Code::INVALID_ARGUMENT) << offset;
@@ -349,7 +349,7 @@ TEST_F(ReadCaseTest, AClientThatIsGoneEndsIt) {
   EXPECT_TRUE(gate_.WaitUntilIdle(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
 }
 
-TEST_F(ReadCaseTest, ADrainingServerTakesNoNewOneButGivesOut) {
+TEST_F(ReadCaseTest, DrainingServerRefusesUploadsButServesReads) {
   gate_.StartDraining();
   EXPECT_TRUE(Begin()->EndsWith(Code::UNAVAILABLE));
   v1::ReadCaseRequest request;

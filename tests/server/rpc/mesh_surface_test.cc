@@ -144,7 +144,7 @@ TEST_F(GetSurfaceTest, RegionsAreThoseOfTheTetsBehind) {
   }
 }
 
-TEST_F(GetSurfaceTest, WhatIsNotThereIsRefusedByName) {
+TEST_F(GetSurfaceTest, RefusesUnknownMeshesAndArraysByName) {
   Get({}, "meshes/" + std::string(64, '0'));
   EXPECT_EQ(status_.error_code(), Code::NOT_FOUND);
   Get({}, "cases/" + std::string(64, '0'));

@@ -130,7 +130,7 @@ TEST_F(MeshUploadStreamTest, KeepsThePartThatCameBeforeTheClientLeft) {
   EXPECT_TRUE(third->response.already_existed());
 }
 
-TEST_F(MeshUploadStreamTest, AGoodAnswerWaitsForTheClientToEndItsStreamAndDropsWhatComes) {
+TEST_F(MeshUploadStreamTest, SuccessWaitsForTheClientToCloseAndDropsExtraData) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(300);
   MeshService service(&gate_, impatient, &no_logins_.changes, &catalog_, &uploads_, &registry_,
@@ -152,7 +152,7 @@ TEST_F(MeshUploadStreamTest, AGoodAnswerWaitsForTheClientToEndItsStreamAndDropsW
   EXPECT_FALSE(cancelled->call.WaitUntilDone()->ok());
 }
 
-TEST_F(MeshUploadStreamTest, AGoodAnswerDoesNotWaitForEverForAClientThatGoesOnSending) {
+TEST_F(MeshUploadStreamTest, SuccessDoesNotWaitForeverForAClientThatKeepsSending) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(300);
   MeshService service(&gate_, impatient, &no_logins_.changes, &catalog_, &uploads_, &registry_,
@@ -179,7 +179,7 @@ TEST_F(MeshUploadStreamTest, ASecondCallIsRefusedWhileTheFirstSends) {
 }
 
 // Beside each other on the same workers, with every order of reactions that there is.
-TEST_F(MeshUploadStreamTest, OfManyCallsAtOnceNoBytesMix) {
+TEST_F(MeshUploadStreamTest, DoesNotMixBytesOfConcurrentCalls) {
   std::vector<std::unique_ptr<UploadCall>> uploads;
   uploads.reserve(16);
   for (int i = 0; i < 16; ++i) {
@@ -200,7 +200,7 @@ TEST_F(MeshUploadStreamTest, OfManyCallsAtOnceNoBytesMix) {
   EXPECT_EQ(catalog_.Find(announcement_.sha256)->mesh.positions(), sample_.mesh.positions());
 }
 
-TEST_F(MeshUploadStreamTest, ASilentOneEndsHoldsNoMemoryAndKeepsWhatCame) {
+TEST_F(MeshUploadStreamTest, SilentUploadEndsFreesMemoryAndKeepsItsPart) {
   ServiceLimits impatient = limits_;
   impatient.upload_silence = std::chrono::milliseconds(20);
   MeshService service(&gate_, impatient, &no_logins_.changes, &catalog_, &uploads_, &registry_,

@@ -87,7 +87,7 @@ TEST_F(MovedSessionTest, AStreamThatRestsEndsWhenItsSessionIsLost) {
   EXPECT_TRUE(HasMoved(other_stream->WaitUntilDone()));
 }
 
-TEST_F(MovedSessionTest, AfterTheLeaseNoPoseIsAnsweredThoughNobodyHasSaidSo) {
+TEST_F(MovedSessionTest, AnswersNoPoseAfterItsLeaseEvenWithoutANotice) {
   for (const bool prepared : {false, true}) {
     SCOPED_TRACE(prepared);
     v1::DeformRequest configuration = Configuration(MakeSession());
@@ -119,7 +119,7 @@ TEST_F(MovedSessionTest, AFrameThatWaitsForItsWriteIsNotWritten) {
 }
 
 // The lease ends at every place that asks for it, early answers and a refinement among them.
-TEST_F(MovedSessionTest, NothingIsWrittenOnceItWasFoundLost) {
+TEST_F(MovedSessionTest, WritesNothingOnceTheSessionIsFoundLost) {
   const std::string session = MakeSession();
   int most_frames = 0;
   for (int answers = 0; answers < 40; ++answers) {
@@ -243,7 +243,7 @@ TEST_F(MovedSessionTest, AnAnswerThatIsReadyTooLateIsNotGiven) {
   EXPECT_TRUE(was_given && was_refused);
 }
 
-TEST_F(MovedSessionTest, WatchesEndWithTheirDragAndBeginAnewWithTheCommittedPose) {
+TEST_F(MovedSessionTest, WatchesEndWithTheirDragAndRestartAtTheCommittedPose) {
   const std::string session = MakeSession();
   WatchCall watch(reactions_.get(), &deform_service_, session);
   watch.Begin(v1::WATCH_ORIGIN_REST);

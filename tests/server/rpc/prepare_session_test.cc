@@ -341,7 +341,7 @@ TEST_F(PrepareSessionTest, ARestoreThatIsCancelledWhileItReadsIsAnsweredAtOnce) 
   EXPECT_TRUE(Run(request).session.has_value());
 }
 
-TEST_F(PrepareSessionTest, TwoCallsOfOneRequestBothSeeItAndGetOneSession) {
+TEST_F(PrepareSessionTest, TwoCallsOfOneRequestShareProgressAndSession) {
   std::promise<void> go = Hold(Lane::kBatch);
   v1::PrepareSessionRequest request = Creation();
   request.mutable_create()->set_request_id("id");

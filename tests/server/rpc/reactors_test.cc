@@ -248,7 +248,7 @@ TEST_F(ReactorsTest, AClientThatDoesNotReadGetsOneWriteAndOthersGoOn) {
   EXPECT_EQ(streams_.size(), 0);
 }
 
-TEST_F(ReactorsTest, OfTenThousandStreamsAsManyAreServedAsThereArePlaces) {
+TEST_F(ReactorsTest, ServesUpToTheStreamLimitOfTenThousandStreams) {
   const auto level = spdlog::get_level();
   spdlog::set_level(spdlog::level::off);  // one line for each that is refused
   const std::string session = MakeSession();
@@ -281,7 +281,7 @@ TEST_F(ReactorsTest, OfTenThousandStreamsAsManyAreServedAsThereArePlaces) {
   EXPECT_EQ(streams_.size(), 0);
 }
 
-TEST_F(ReactorsTest, AStreamWithoutConfigurationIsGivenUpAndLeavesItsPlace) {
+TEST_F(ReactorsTest, EndsAStreamWithoutConfigurationAndFreesItsPlace) {
   ServiceLimits impatient = limits_;
   impatient.configuration_deadline = std::chrono::milliseconds(20);
   DeformService service(&gate_, impatient, &no_logins_.access, &registry_, &streams_, &watches_,

@@ -85,7 +85,7 @@ TEST_F(StreamDragTest, AnswersTheNewestPoseByASolve) {
   EXPECT_EQ(finished.pose->sequence, 3);
 }
 
-TEST_F(StreamDragTest, AnswersFromPreparedColumnsAndSolvesWhatTheyDoNotCover) {
+TEST_F(StreamDragTest, AnswersFromPreparedColumnsAndSolvesUncoveredPoses) {
   v1::DeformConfiguration request = Request();
   request.mutable_prepared()->set_tolerance_mm(1e-3);
   const auto configuration = Configure(MakeSession(), request);
@@ -123,7 +123,7 @@ TEST_F(StreamDragTest, GivesThePoseBackWhenTheSessionHasLeftMemory) {
   EXPECT_EQ(finished.pose->sequence, 5);
 }
 
-TEST_F(StreamDragTest, ShowsWhatAnIterationHasAndStopsForANewerPose) {
+TEST_F(StreamDragTest, ShowsIntermediateIterationsAndStopsForANewerPose) {
   host_.newest = PoseAt(1, 0.2);
   PostAnswer(&host_, Iterating(), nullptr);
   FakeHost::Finished finished = host_.Wait();

@@ -75,7 +75,7 @@ class WatchTest : public ReactorsTest {
   }
 };
 
-TEST_F(WatchTest, EveryFrameOfADragIsSeenAsItWasSentByTwoWhoShareIt) {
+TEST_F(WatchTest, TwoWatchersSeeEveryFrameOfADragAsSent) {
   const std::string session = MakeSession();
   auto one = Watch(session);
   auto other = Watch(session);
@@ -105,7 +105,7 @@ TEST_F(WatchTest, EveryFrameOfADragIsSeenAsItWasSentByTwoWhoShareIt) {
   EXPECT_EQ(watches_.size(), 0);
 }
 
-TEST_F(WatchTest, ADragHearsHowManyFollow) {
+TEST_F(WatchTest, DragIsToldItsNumberOfFollowers) {
   const std::string session = MakeSession();
   const std::unique_ptr<WatchCall> first = Watch(session);
   first->Begin(v1::WATCH_ORIGIN_REST);
@@ -127,7 +127,7 @@ TEST_F(WatchTest, ADragHearsHowManyFollow) {
   EndDrag(std::move(other_drag));
 }
 
-TEST_F(WatchTest, ADragThatNobodyFollowsHearsNothingOfIt) {
+TEST_F(WatchTest, DragWithoutFollowersGetsNoNotice) {
   const std::string session = MakeSession();
   const std::unique_ptr<FakeStream> drag = Drag(session);
   drag->Send(Pose(1));
@@ -221,7 +221,7 @@ TEST_F(WatchTest, ALateWatchReceivesTheNewestFrame) {
   EndDrag(std::move(drag));
 }
 
-TEST_F(WatchTest, ASlowWatchIsSentTheNewestFrameOnlyAndSlowsNobody) {
+TEST_F(WatchTest, SlowWatchGetsOnlyTheNewestFrameAndDelaysNoOther) {
   const std::string session = MakeSession();
   auto slow = Watch(session, 1);
   const std::string id = slow->Begin(v1::WATCH_ORIGIN_REST);

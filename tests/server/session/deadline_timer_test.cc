@@ -38,7 +38,7 @@ TEST(DeadlineTimerTest, CallsInTheOrderOfTheDeadlinesAndNotBeforeThem) {
   EXPECT_GE(second_came, begin + milliseconds(20));
 }
 
-TEST(DeadlineTimerTest, WhatIsCancelledIsNotCalled) {
+TEST(DeadlineTimerTest, DoesNotCallACancelledCallback) {
   std::atomic<bool> called = false;
   DeadlineTimer timer;
   const DeadlineTimer::Id far = timer.Start(Now() + hours(1), [&] { called = true; });

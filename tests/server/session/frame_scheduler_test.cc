@@ -131,7 +131,7 @@ AnswerFrame EstimateAndTake(FrameScheduler* flow) {
   return *flow->TakeFrame();
 }
 
-TEST(FrameSchedulerTest, AnEstimateIsWorkedOutWhenTheHandRests) {
+TEST(FrameSchedulerTest, RefinesAnEstimateWhenTheDragRests) {
   FrameScheduler flow(2);
   ASSERT_THAT(flow.Put(1, {}), IsOk());
   EXPECT_FALSE(flow.StartRefinement(true)) << "there is no estimate";
@@ -308,7 +308,7 @@ TEST(FrameSchedulerTest, MeasuresPosesFramesAndAcknowledgements) {
   EXPECT_EQ(count(measures.picture_age), 1) << "the frame that is looked at, not those before it";
 }
 
-TEST(FrameSchedulerTest, ASolveWithoutAnswerFreesTheWay) {
+TEST(FrameSchedulerTest, SolveWithoutAnswerFreesTheScheduler) {
   FrameScheduler flow(1);
   ASSERT_THAT(flow.Put(1, {}), IsOk());
   ASSERT_TRUE(flow.StartSolve());

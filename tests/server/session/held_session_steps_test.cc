@@ -247,7 +247,7 @@ class HeldSessionStepsTest : public ::testing::Test {
 };
 
 // All orders of three steps, and on from every state that there is, up to six.
-TEST_F(HeldSessionStepsTest, NeverDoBothAnswerAndNothingIsWrittenUnderAnOldEpoch) {
+TEST_F(HeldSessionStepsTest, NeverLetBothServersAnswerNorWriteUnderAnOldEpoch) {
   constexpr size_t kAllOrders = 2;
   constexpr size_t kDeepest = 6;
   const std::vector<Step> all = AllSteps();

@@ -226,7 +226,7 @@ TEST_F(HeldSessionsTest, KeepsACancelledCreationThatAnotherServerHasTaken) {
   EXPECT_EQ(shared_.stale_writes(), 0);
 }
 
-TEST_F(HeldSessionsTest, AnEvictedSessionIsOthersUnlessSomebodyHasIt) {
+TEST_F(HeldSessionsTest, OthersMayTakeAnEvictedSessionUnlessItIsInUse) {
   for (const bool is_dragged : {false, true}) {
     SCOPED_TRACE(is_dragged);
     const std::string id = is_dragged ? "dragged" : "idle";
@@ -268,7 +268,7 @@ TEST_F(HeldSessionsTest, ReleasesASessionThatCannotBeLoadedBeforeItAnswers) {
   EXPECT_THAT(a_.Open("s"), IsOk());
 }
 
-TEST_F(HeldSessionsTest, NewsOfOthersAreLearntAndThoseOfOwnDoingPassedOver) {
+TEST_F(HeldSessionsTest, LearnsOfOthersChangesAndIgnoresItsOwn) {
   ASSERT_THAT(a_.Create("s", "request"), IsOk());
   SessionRecord record = a_.Look("s")->record;
   a_.registry.sync().OnChanged(record);
@@ -287,7 +287,7 @@ TEST_F(HeldSessionsTest, NewsOfOthersAreLearntAndThoseOfOwnDoingPassedOver) {
   EXPECT_EQ(b_.registry.table().CountKnown(), 0);
 }
 
-TEST_F(HeldSessionsTest, OnlyWhatCanBeTakenIsRemovedForItsAge) {
+TEST_F(HeldSessionsTest, RemovesOnlyUnheldSessionsForTheirAge) {
   ASSERT_THAT(a_.Create("held"), IsOk());
   ASSERT_THAT(a_.Create("free"), IsOk());
   a_.EvictAll();
@@ -300,7 +300,7 @@ TEST_F(HeldSessionsTest, OnlyWhatCanBeTakenIsRemovedForItsAge) {
   EXPECT_TRUE(b_.registry.table().Knows("held"));
 }
 
-TEST_F(HeldSessionsTest, AServerThatHandsOverHasNothingLeftAndTakesNothingMore) {
+TEST_F(HeldSessionsTest, HandingOverReleasesAllSessionsAndTakesNoMore) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> dragged, a_.Create("dragged"));
   ASSERT_THAT(a_.Create("loaded"), IsOk());
   ASSERT_THAT(a_.Commit(dragged, 1), IsOk());
@@ -319,7 +319,7 @@ TEST_F(HeldSessionsTest, AServerThatHandsOverHasNothingLeftAndTakesNothingMore) 
   EXPECT_THAT(b_.Open("late"), IsOk());
 }
 
-TEST_F(HeldSessionsTest, ServersThatDoEverythingAtOnceWriteNothingOfOthersAndEndWithNothing) {
+TEST_F(HeldSessionsTest, ConcurrentServersNeverWriteOthersSessionsNorLeak) {
   const int64_t a_bytes = a_.reserved_bytes();
   const int64_t b_bytes = b_.reserved_bytes();
   const std::vector<std::string> ids = {"q", "r", "s", "t", "u", "v", "w", "x", "y", "z"};

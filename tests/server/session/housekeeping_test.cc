@@ -152,7 +152,7 @@ class HousekeepingTest : public ::testing::Test {
   std::shared_ptr<const StoredMesh> bar_;
 };
 
-TEST_F(HousekeepingTest, WhatNobodyUsedForTheRetentionGoesAndNotASecondEarlier) {
+TEST_F(HousekeepingTest, RemovesUnusedSessionsExactlyAfterTheirRetention) {
   const std::string mesh = bar_->sha256;
   Create("a");
   bar_.reset();
@@ -194,7 +194,7 @@ class SharedStores final : public Stores {
   const std::atomic<int64_t>& now_s_;
 };
 
-TEST_F(HousekeepingTest, WhatIsOldInAStoreThatSeveralServersShareItsClockSays) {
+TEST_F(HousekeepingTest, UsesTheClockOfASharedStore) {
   Create("a");
   bar_.reset();
   SharedStores shared(stores_.get(), &unix_s_);
@@ -211,7 +211,7 @@ TEST_F(HousekeepingTest, WhatIsOldInAStoreThatSeveralServersShareItsClockSays) {
   EXPECT_EQ(housekeeping.RunOnce().sessions, 1);
 }
 
-TEST_F(HousekeepingTest, AUseIsWrittenDownAndARestartIsNone) {
+TEST_F(HousekeepingTest, RecordsUsesButNotARestart) {
   Create("used");
   Create("idle");
   bar_.reset();
@@ -230,7 +230,7 @@ TEST_F(HousekeepingTest, AUseIsWrittenDownAndARestartIsNone) {
   EXPECT_THAT(Record("used"), IsOk());
 }
 
-TEST_F(HousekeepingTest, WhatAStreamHoldsStaysHoweverLongItSaysNothing) {
+TEST_F(HousekeepingTest, KeepsASessionHeldByAnIdleStream) {
   const std::shared_ptr<Session> held = Create("held");
   const std::string mesh = bar_->sha256;
   bar_.reset();
@@ -246,7 +246,7 @@ TEST_F(HousekeepingTest, WhatAStreamHoldsStaysHoweverLongItSaysNothing) {
   EXPECT_THAT(Open("held"), ::testing::NotNull());
 }
 
-TEST_F(HousekeepingTest, ARetentionOfZeroKeepsForEver) {
+TEST_F(HousekeepingTest, RetentionOfZeroKeepsEverything) {
   Create("a");
   Predict("p", "gone", bar_->sha256);
   Restart(/*retention_days=*/0);
@@ -303,7 +303,7 @@ TEST_F(HousekeepingTest, PredictionsGoWithTheirAgeOnceTheirSessionIsGoneAndKeepT
   EXPECT_THAT(stores_->meshes().Find(mesh), IsOk());
 }
 
-TEST_F(HousekeepingTest, CasesThatNobodyOpenedGoUnlessAPredictionNamesThem) {
+TEST_F(HousekeepingTest, RemovesUnopenedCasesUnlessAPredictionNamesThem) {
   const std::string unused = KeepCase('a');
   const std::string opened = KeepCase('b');
   const std::string predicted = KeepCase('c');
@@ -365,7 +365,7 @@ TEST_F(HousekeepingTest, AMeshWithoutATimeOfUseCountsFromNowOn) {
 }
 
 // On the machine's own clock: the age of an upload is its file's.
-TEST_F(HousekeepingTest, UploadsThatWereBrokenOffGoAfterADay) {
+TEST_F(HousekeepingTest, RemovesInterruptedUploadsAfterADay) {
   unix_s_ = SystemUnixSeconds();
   Restart();
   const SampleMesh sample(Bar({2, 2, 3}));
@@ -379,7 +379,7 @@ TEST_F(HousekeepingTest, UploadsThatWereBrokenOffGoAfterADay) {
               StatusIs(absl::StatusCode::kNotFound));
 }
 
-TEST_F(HousekeepingTest, ItsEndWritesWhatWasUsed) {
+TEST_F(HousekeepingTest, StopWritesTheTimesOfUse) {
   housekeeping_->Start();
   Pass(100);
   Create("a");

@@ -148,7 +148,7 @@ TEST(MemoryBudgetTest, AReservationThatWaitsIsRefusedWhenReclaimingEnds) {
   EXPECT_FALSE(budget.Reserve(101, "too much").ok()) << "at once";
 }
 
-TEST(MemoryBudgetTest, ThreadsNeverTakeMoreThanThereIs) {
+TEST(MemoryBudgetTest, ThreadsNeverExceedTheBudget) {
   MemoryBudget budget(8);
   std::atomic<bool> exceeded = false;
   constexpr int kThreads = 4;
@@ -209,7 +209,7 @@ TEST(MemoryBudgetTest, BytesThatAnOwnerReleasesMakeRoomForTheSameOwner) {
   EXPECT_EQ(budget.reserved_bytes(), 50);
 }
 
-TEST(MemoryBudgetTest, TheMostThatWasReservedIsRemembered) {
+TEST(MemoryBudgetTest, RemembersThePeakReservation) {
   MemoryBudget budget(100);
   {
     const MemoryReservation first = *budget.Reserve(40, "first");

@@ -115,7 +115,7 @@ TEST_F(MeshCatalogTest, WrongDigestIsDataLossAndLeavesNothing) {
   EXPECT_EQ(budget_.reserved_bytes(), 0);
 }
 
-TEST_F(MeshCatalogTest, AnnouncementsThatCannotBeAreRefused) {
+TEST_F(MeshCatalogTest, RefusesInvalidAnnouncements) {
   const auto refused = [this](auto change, absl::StatusCode code, const char* text) {
     UploadAnnouncement announcement = sample_.Announcement();
     change(announcement);

@@ -89,7 +89,7 @@ TEST_F(MeshUploadsTest, AMeshComesOutAsItWentInWhateverTheChunks) {
   }
 }
 
-TEST_F(MeshUploadsTest, WhatWasBrokenOffGoesOnAfterARestart) {
+TEST_F(MeshUploadsTest, ResumesAnInterruptedUploadAfterARestart) {
   SendUpTo(1000);
   Restart();
   EXPECT_EQ(Committed(), 1000);
@@ -100,7 +100,7 @@ TEST_F(MeshUploadsTest, WhatWasBrokenOffGoesOnAfterARestart) {
   EXPECT_EQ(stored->mesh.positions(), sample_.mesh.positions());
 }
 
-TEST_F(MeshUploadsTest, AtZeroItBeginsAnew) {
+TEST_F(MeshUploadsTest, WritingAtZeroRestartsTheUpload) {
   {
     const std::unique_ptr<MeshUpload> wrong = Open();
     ASSERT_THAT(wrong->Write(0, std::string(1000, 'x'), false), IsOk());
@@ -155,7 +155,7 @@ TEST_F(MeshUploadsTest, ASecondUploadOfTheMeshIsRefusedAsLongAsTheFirstLives) {
   EXPECT_EQ(Open()->received_bytes(), 10);
 }
 
-TEST_F(MeshUploadsTest, AHeaderThatSaysOtherwiseBeginsAnew) {
+TEST_F(MeshUploadsTest, DifferentHeaderRestartsTheUpload) {
   SendUpTo(1000);
   UploadAnnouncement other = SampleMesh(Bar({2, 2, 4})).Announcement();
   other.sha256 = announcement_.sha256;
@@ -190,7 +190,7 @@ TEST_F(MeshUploadsTest, WrongBytesAreDropped) {
   EXPECT_EQ(Open()->received_bytes(), 0);
 }
 
-TEST_F(MeshUploadsTest, AMeshThatNobodyCanUseIsDropped) {
+TEST_F(MeshUploadsTest, DropsAnUnusableMesh) {
   SampleMesh broken = sample_;
   broken.cell_arrays[0].values[7] = std::numeric_limits<double>::quiet_NaN();
   ASSERT_OK_AND_ASSIGN(const auto upload, uploads_->Open(broken.Announcement()));
@@ -215,7 +215,7 @@ TEST_F(MeshUploadsTest, WithoutRoomInMemoryThePartStaysAndTheEndIsEnough) {
   EXPECT_EQ(Committed(), -1);
 }
 
-TEST_F(MeshUploadsTest, OverTheStoresLimitsWhatCameBeforeStays) {
+TEST_F(MeshUploadsTest, ExceedingTheStoresLimitsKeepsTheEarlierPart) {
   Restart({.max_bytes = 1500, .max_parts = 1});
   {
     const std::unique_ptr<MeshUpload> upload = Open();
@@ -228,7 +228,7 @@ TEST_F(MeshUploadsTest, OverTheStoresLimitsWhatCameBeforeStays) {
   EXPECT_EQ(Committed(), 1000);
 }
 
-TEST_F(MeshUploadsTest, AnnouncementsThatCannotBeHoldNothing) {
+TEST_F(MeshUploadsTest, InvalidAnnouncementsReserveNothing) {
   UploadAnnouncement wrong = announcement_;
   ++wrong.total_bytes;
   EXPECT_THAT(uploads_->Open(wrong), StatusIs(Code::kInvalidArgument));

@@ -133,7 +133,7 @@ class SessionEvictionTest : public ::testing::Test {
   int64_t mesh_bytes_ = 0;
 };
 
-TEST_F(SessionEvictionTest, WhatNobodyUsesIsWhatLeavingWouldGiveBack) {
+TEST_F(SessionEvictionTest, EvictableBytesAreThoseThatEvictionWouldFree) {
   EXPECT_EQ(registry_->table().EvictableBytes(), 0);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create("first").get());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> second, Create("second").get());
@@ -149,7 +149,7 @@ TEST_F(SessionEvictionTest, WhatNobodyUsesIsWhatLeavingWouldGiveBack) {
   EXPECT_EQ(registry_->table().EvictableBytes(), 0);
 }
 
-TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameAnswers) {
+TEST_F(SessionEvictionTest, EvictsUnusedSessionsAndRestoresTheSameAnswers) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, Create("bar").get());
   const Positions answer = Answer(*before);
   clock_.Advance(SessionTable::kInUse);
@@ -169,7 +169,7 @@ TEST_F(SessionEvictionTest, WhatIsNotInUseGivesItsMemoryAndComesBackWithTheSameA
   EXPECT_EQ(Open("bar").get().value(), after);
 }
 
-TEST_F(SessionEvictionTest, TheOrderOfTheVerticesIsKeptAndNotLookedForAgain) {
+TEST_F(SessionEvictionTest, StoresTheVertexOrderAndReusesIt) {
   bar_ = Store(SampleMesh(Bar({4, 4, 8})), &catalog_);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> before, Create("bar").get());
   SessionRecord record = Kept("bar");
@@ -190,7 +190,7 @@ TEST_F(SessionEvictionTest, TheOrderOfTheVerticesIsKeptAndNotLookedForAgain) {
   EXPECT_EQ(factor_bytes_in({2, 0, 1}), found) << "that of another mesh";
 }
 
-TEST_F(SessionEvictionTest, ThoseUsedLongestAgoGoFirstAndNoMoreThanAreNeeded) {
+TEST_F(SessionEvictionTest, EvictsLeastRecentlyUsedFirstAndNoMoreThanNeeded) {
   for (const char* id : {"a", "b", "c"}) {
     ASSERT_THAT(Create(id).get(), IsOk());
     clock_.Advance(std::chrono::seconds(1));
@@ -283,7 +283,7 @@ TEST_F(SessionEvictionTest, ACreationThatJoinedARestoreAndWasAnsweredHasAClaim) 
   EXPECT_THAT(Open("a").get(), StatusIs(absl::StatusCode::kNotFound));
 }
 
-TEST_F(SessionEvictionTest, WhatIsDeletedWhileItComesBackDoesNotComeBack) {
+TEST_F(SessionEvictionTest, SessionDeletedDuringItsRestoreStaysDeleted) {
   ASSERT_THAT(Create("a").get(), IsOk());
   Restart();
   std::promise<void> release = HoldWorker();
@@ -353,7 +353,7 @@ TEST_F(SessionEvictionTest, AReservationOfAnOwnerGetsTheRoomOfThatOwnersSessions
   EXPECT_EQ(registry_->table().Loaded(), std::vector{of_bob});
 }
 
-TEST_F(SessionEvictionTest, AnOwnerHasNoMoreSessionsThanTheQuotaAndOthersAreNotBothered) {
+TEST_F(SessionEvictionTest, SessionQuotaLimitsAnOwnerWithoutAffectingOthers) {
   registry_->table().set_max_of_owner(2);
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, CreateOf("ann", "first"));
   ASSERT_THAT(CreateOf("ann"), IsOk());

@@ -78,7 +78,7 @@ struct Heard {
   std::vector<SessionProgress> all;
 };
 
-TEST(ProgressFeedTest, IsHeardByThoseOfTheTopicAndByWhoComesInTheMiddle) {
+TEST(ProgressFeedTest, ReachesFollowersOfTheTopicIncludingLateOnes) {
   ProgressFeed feed;
   Heard early;
   Heard other;
@@ -143,7 +143,7 @@ TEST_F(SessionProgressTest, ACreationReportsEveryStage) {
   EXPECT_EQ(heard.all[heard.all.size() - 2], (SessionProgress{SessionStage::kResponses, 12, 12}));
 }
 
-TEST_F(SessionProgressTest, OfOnePreparationAllHearWhoNeedWhatIsMade) {
+TEST_F(SessionProgressTest, SharedPreparationReportsToAllSessionsThatNeedIt) {
   // All three share it; the third needs another factor.
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });

@@ -224,7 +224,7 @@ TEST_F(SessionRegistryTest, ACancelledCreationLeavesNothingBehind) {
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
 }
 
-TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItEnds) {
+TEST_F(SessionRegistryTest, CancelledCallerIsAnsweredAtOnceAndItsWorkEnds) {
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
@@ -243,7 +243,7 @@ TEST_F(SessionRegistryTest, ACancelledCallerIsAnsweredAtOnceAndWhatWasMadeForItE
   EXPECT_THAT(Create({"id", "print", "chosen"}).get(), IsOk());
 }
 
-TEST_F(SessionRegistryTest, ARepeatedRequestJoinsWhatIsGivenUpBeforeItHasStopped) {
+TEST_F(SessionRegistryTest, RepeatedRequestJoinsACancelledCreationBeforeItStops) {
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   const auto cancelled = std::make_shared<std::atomic<bool>>(true);
@@ -259,7 +259,7 @@ TEST_F(SessionRegistryTest, ARepeatedRequestJoinsWhatIsGivenUpBeforeItHasStopped
   EXPECT_THAT(Stored(), ::testing::ElementsAre("chosen"));
 }
 
-TEST_F(SessionRegistryTest, ARepeatedRequestTakesUpWhatWasCancelledInTheSameStage) {
+TEST_F(SessionRegistryTest, RepeatedRequestResumesACreationCancelledInThatStage) {
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
   std::future<CreateResult> again;
   std::promise<CreateResult> first;
@@ -283,7 +283,7 @@ TEST_F(SessionRegistryTest, ARepeatedRequestTakesUpWhatWasCancelledInTheSameStag
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_ + session->bytes_held());
 }
 
-TEST_F(SessionRegistryTest, ASessionThatNobodyWaitsForAnyMoreEndsThoughItIsMade) {
+TEST_F(SessionRegistryTest, RemovesAFinishedSessionThatNoCallerAwaits) {
   const auto cancelled = std::make_shared<std::atomic<bool>>(false);
   // After its last stage: too late to stop early.
   store_.before_create = [&] { registry_->loader().CancelWait(cancelled); };
@@ -295,7 +295,7 @@ TEST_F(SessionRegistryTest, ASessionThatNobodyWaitsForAnyMoreEndsThoughItIsMade)
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
 }
 
-TEST_F(SessionRegistryTest, OneCancelledCallerDoesNotSpoilItForTheOther) {
+TEST_F(SessionRegistryTest, OneCancelledCallerDoesNotAffectTheOther) {
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
   const auto cancelled = std::make_shared<std::atomic<bool>>(true);
@@ -378,7 +378,7 @@ TEST_F(SessionRegistryTest, ASessionIsIdleFromTheEndOfItsTtlAndNotBefore) {
   EXPECT_EQ(budget_->reserved_bytes(), mesh_bytes_);
 }
 
-TEST_F(SessionRegistryTest, WhoeverAsksForASessionKeepsIt) {
+TEST_F(SessionRegistryTest, FindingASessionKeepsItFromExpiring) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> session, Create().get());
   clock_.Advance(kTtl - kTick);
   EXPECT_THAT(registry_->table().Find(session->id()), IsOk());
@@ -423,7 +423,7 @@ TEST_F(SessionRegistryTest, AnIdUnderDeletionIsNeitherThereNorFreeAndTheMessageS
   EXPECT_THAT(Create({"", "", "chosen"}).get(), IsOk());
 }
 
-TEST_F(SessionRegistryTest, ALateAbandonLeavesTheNextSessionOfTheIdAlone) {
+TEST_F(SessionRegistryTest, LateAbandonDoesNotAffectTheNextSessionOfTheId) {
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> first, Create({"", "", "chosen"}).get());
   ASSERT_THAT(Delete("chosen"), IsOk());
   ASSERT_OK_AND_ASSIGN(const std::shared_ptr<Session> second, Create({"", "", "chosen"}).get());
@@ -463,7 +463,7 @@ TEST_F(SessionRegistryTest, TheStoreHoldsTheRecordsOfTheSessionsThatLive) {
   EXPECT_THAT(Stored(), ::testing::IsEmpty());
 }
 
-TEST_F(SessionRegistryTest, WhatCannotBeMadeOrIsAbandonedLeavesNoRecord) {
+TEST_F(SessionRegistryTest, FailedOrAbandonedCreationLeavesNoRecord) {
   const auto cancelled = std::make_shared<std::atomic<bool>>(true);
   EXPECT_FALSE(Create({}, cancelled).get().ok());
   EXPECT_THAT(Stored(), ::testing::IsEmpty());

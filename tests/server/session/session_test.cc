@@ -68,7 +68,7 @@ class SessionTest : public ::testing::Test {
   const int64_t mesh_bytes_ = budget_.reserved_bytes();
 };
 
-TEST_F(SessionTest, IsWhatItsRecordSays) {
+TEST_F(SessionTest, MatchesItsRecord) {
   SessionRecord record = BarRecord(*bar_);
   record.model = DeformationModel::kArap;
   record.poisson_ratio = 0.3;
@@ -133,7 +133,7 @@ TEST_F(SessionTest, AUniformStiffnessIsAnArrayOfIt) {
   EXPECT_EQ(a.positions, b.positions);
 }
 
-TEST_F(SessionTest, WhatCannotBeMadeIsRefusedByNameAndLeavesNothing) {
+TEST_F(SessionTest, RefusesInvalidRecordsByNameAndReservesNothing) {
   const auto refused = [this](auto change, absl::StatusCode code, const char* text) {
     SessionRecord record = BarRecord(*bar_);
     change(record);
@@ -216,7 +216,7 @@ TEST_F(SessionTest, AClosedSessionHoldsNothingAndAnswersNothing) {
   session->Close(Session::CloseReason::kDeleted);  // does no harm
 }
 
-TEST_F(SessionTest, ASecondSessionOfTheSameTakesATenthAndAnswersAlike) {
+TEST_F(SessionTest, SecondEqualSessionNeedsATenthAndAnswersTheSame) {
   SessionRecord record = BarRecord(*bar_);
   record.model = DeformationModel::kLinearElastic;
   ASSERT_OK_AND_ASSIGN(const auto first, Create(record));
@@ -243,7 +243,7 @@ TEST_F(SessionTest, AClosedSessionTakesThePreparedAnswersFromItsStreams) {
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("sessions/id")));
 }
 
-TEST_F(SessionTest, AModelThatWasNotPreparedIsNotMadeOnTheWay) {
+TEST_F(SessionTest, SolveDoesNotPrepareAMissingModel) {
   ASSERT_OK_AND_ASSIGN(const auto session, Create(BarRecord(*bar_)));
   EXPECT_FALSE(session->HasModel(DeformationModel::kArap));
   EXPECT_THAT(session->Solve(DeformationModel::kArap, {Turn(1)}, {}),

@@ -133,7 +133,7 @@ class SessionUpdateTest : public ::testing::Test {
   int64_t mesh_bytes_ = 0;
 };
 
-TEST_F(SessionUpdateTest, TheNameStaysAndTheRestIsWhatIsAskedFor) {
+TEST_F(SessionUpdateTest, KeepsTheNameAndAppliesTheRequestedChange) {
   const SessionRecord before = Record();
   ASSERT_OK_AND_ASSIGN(const SessionView view, Update(before.etag, [](SessionRecord* record) {
                                                  record->model = DeformationModel::kLinearElastic;
@@ -165,7 +165,7 @@ TEST_F(SessionUpdateTest, AnOldEtagIsRefusedBeforeAnythingIsMade) {
   EXPECT_THAT(Update("", Rename).get(), IsOk()) << "whatever it is";
 }
 
-TEST_F(SessionUpdateTest, OfTwoAtOnceOneIsKept) {
+TEST_F(SessionUpdateTest, OneOfTwoConcurrentUpdatesIsKept) {
   const std::string etag = Record().etag;
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
@@ -193,7 +193,7 @@ TEST_F(SessionUpdateTest, AFailedUpdateLeavesTheSessionUnchanged) {
   EXPECT_EQ(budget_.reserved_bytes(), bytes);
 }
 
-TEST_F(SessionUpdateTest, ACancelledOneLeavesTheSessionAsItWas) {
+TEST_F(SessionUpdateTest, CancelledUpdateLeavesTheSessionUnchanged) {
   const std::string etag = Record().etag;
   std::promise<void> go;
   pool_->Post(Lane::kBatch, [&go] { go.get_future().wait(); });
@@ -271,7 +271,7 @@ TEST_F(SessionUpdateTest, HoldersOfAnEvictedSessionLearnOfTheUpdate) {
   EXPECT_EQ(registry_.table().size(), 1);
 }
 
-TEST_F(SessionUpdateTest, AnOpenerWhoCameBeforeTheUpdateGetsTheUpdatedSession) {
+TEST_F(SessionUpdateTest, OpenStartedBeforeAnUpdateGetsTheUpdatedSession) {
   clock_.Advance(2 * SessionTable::kInUse);
   ASSERT_EQ(registry_.table().Evict([] { return false; }), 1);
   std::promise<void> go;

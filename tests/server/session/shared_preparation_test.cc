@@ -287,7 +287,7 @@ TEST_F(SharedPreparationTest, ARefusalKeepsThePreparationAndMayBeRetried) {
   EXPECT_THAT(Make(DeformationModel::kNeoHookean), IsOk());
 }
 
-TEST_F(SharedPreparationTest, OfPreparedAnswersTheOneThatWasNotUsedForLongestMakesWay) {
+TEST_F(SharedPreparationTest, EvictsTheLeastRecentlyUsedPreparedAnswers) {
   ASSERT_OK_AND_ASSIGN(const auto first, Respond(Request(1.0)));
   int64_t held_with_four = 0;
   for (int i = 2; i <= 4; ++i) {
@@ -302,7 +302,7 @@ TEST_F(SharedPreparationTest, OfPreparedAnswersTheOneThatWasNotUsedForLongestMak
   EXPECT_EQ(first, kept) << "another made way";
 }
 
-TEST_F(SharedPreparationTest, PreparedAnswersThatMadeWayStayWithWhoeverUsesThemAndInTheBudget) {
+TEST_F(SharedPreparationTest, EvictedAnswersStayWithTheirUsersAndInTheBudget) {
   ASSERT_OK_AND_ASSIGN(auto first, Respond(Request(1.0)));
   const int64_t bytes = first->reservation.bytes();
   EXPECT_EQ(bytes, first->response->bytes_held());
@@ -345,7 +345,7 @@ class SharedPreparationsTest : public ::testing::Test {
   SharedPreparations preparations_{&budget_, &pool_};
 };
 
-TEST_F(SharedPreparationsTest, AreSharedByWhatIsTheSameWhateverElseDiffers) {
+TEST_F(SharedPreparationsTest, AreSharedByRecordsWithTheSameProblem) {
   const auto first = preparations_.Find(Record());
   SessionRecord record = Record();
   record.id = "another";
@@ -355,7 +355,7 @@ TEST_F(SharedPreparationsTest, AreSharedByWhatIsTheSameWhateverElseDiffers) {
   EXPECT_EQ(preparations_.Find(record), first);
 }
 
-TEST_F(SharedPreparationsTest, AreNotSharedByWhatDiffersOrByOthers) {
+TEST_F(SharedPreparationsTest, AreNotSharedAcrossDifferentProblemsOrOwners) {
   const auto first = preparations_.Find(Record());
   const auto differs = [&](auto change) {
     SessionRecord record = Record();

@@ -218,7 +218,7 @@ class AccessQueriesTest : public ::testing::TestWithParam<StoresCase> {
   std::vector<std::string> meshes_;  // their names
 };
 
-TEST_P(AccessQueriesTest, SayWhatPlainLoopsOverAllRowsSay) {
+TEST_P(AccessQueriesTest, MatchPlainLoopsOverAllRows) {
   const std::vector<std::string> people = {"ann", "bob", "cid", ""};
   const std::vector<std::string> projects = {"", "p", "r"};
   std::mt19937 random(20261127);
@@ -251,7 +251,7 @@ TEST_P(AccessQueriesTest, SayWhatPlainLoopsOverAllRowsSay) {
   }
 }
 
-TEST_P(AccessQueriesTest, NothingIsFoundWhereNothingIs) {
+TEST_P(AccessQueriesTest, FindNothingInAnEmptyStore) {
   EXPECT_FALSE(queries_.FindSession("s", "ann")->has_value());
   EXPECT_FALSE(queries_.FindPrediction("q", "ann")->has_value());
   EXPECT_THAT(*queries_.FindCases(meshes_[0], "ann"), IsEmpty());
@@ -262,7 +262,7 @@ TEST_P(AccessQueriesTest, NothingIsFoundWhereNothingIs) {
   EXPECT_EQ(queries_.HoldingsOf("ann")->bytes, 0);
 }
 
-TEST_P(AccessQueriesTest, ALinkComesWithWhatItsMakerHas) {
+TEST_P(AccessQueriesTest, LinkComesWithTheRightsOfItsCreator) {
   AddSession("s", "ann", "p", meshes_[0]);
   Share("ann", "projects/p", "bob", ShareRole::kPlanner);
   const FollowLinkRow link = {.digest = "d", .session = "s", .maker = "bob", .expires_s = 100};
@@ -280,7 +280,7 @@ TEST_P(AccessQueriesTest, ALinkComesWithWhatItsMakerHas) {
 }
 
 // The next resource of the name starts with no rights.
-TEST_P(AccessQueriesTest, WhatIsDeletedTakesItsRightsWithItInTheSameTransaction) {
+TEST_P(AccessQueriesTest, DeletingAResourceDeletesItsRightsInOneTransaction) {
   const std::string bytes = "the bytes of a case";
   const CaseKey key = {.sha256 = CaseRecordOf(bytes).sha256, .owner = "ann"};
   const auto add = [&] {

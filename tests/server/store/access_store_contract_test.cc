@@ -93,7 +93,7 @@ TEST_P(AccessStoreContractTest, PredictionsAndCasesAreSharedByTheirOwners) {
   }
 }
 
-TEST_P(AccessStoreContractTest, TheLastRoleCountsAndAResourceHasAtMostSoManyShares) {
+TEST_P(AccessStoreContractTest, LastRoleCountsAndSharesOfAResourceAreLimited) {
   MakeSession("a");
   ASSERT_THAT(store_.PutShare(ShareWith("bob", ShareRole::kViewer), kMost), IsOk());
   ASSERT_THAT(store_.PutShare(ShareWith("ann lee"), kMost), IsOk());

@@ -80,7 +80,7 @@ TEST_P(CaseStoreContractTest, AnyPartOfItIsRead) {
   EXPECT_EQ(*reader->Read(5000, 1), "");
 }
 
-TEST_P(CaseStoreContractTest, WhatIsNotThereIsNotFound) {
+TEST_P(CaseStoreContractTest, MissingCaseIsNotFound) {
   const std::string name(64, 'a');
   for (const std::string& missing : {name, std::string("../../etc/passwd")}) {
     EXPECT_THAT(store_->Find(SampleCaseKey(missing)),
@@ -91,7 +91,7 @@ TEST_P(CaseStoreContractTest, WhatIsNotThereIsNotFound) {
   }
 }
 
-TEST_P(CaseStoreContractTest, WhatIsNoCaseIsRefusedAndNothingStays) {
+TEST_P(CaseStoreContractTest, RefusesInvalidCasesAndKeepsNothing) {
   const std::string bytes = SampleCase(1);
   const auto refused = [&](auto change, Code code) {
     CaseRecord record = CaseRecordOf(bytes);
@@ -117,7 +117,7 @@ TEST_P(CaseStoreContractTest, BytesFollowEachOther) {
   EXPECT_THAT(writer->Write(-1, "x"), StatusIs(Code::kInvalidArgument));
 }
 
-TEST_P(CaseStoreContractTest, OneThatIsNotFinishedLeavesNothing) {
+TEST_P(CaseStoreContractTest, UnfinishedCaseLeavesNothing) {
   const std::string bytes = SampleCase(1);
   {
     ASSERT_OK_AND_ASSIGN(const auto writer, store_->Begin(CaseRecordOf(bytes), 100));
@@ -144,7 +144,7 @@ TEST_P(CaseStoreContractTest, TheSameCaseAgainIsKeptOnceAsItWasFirst) {
   EXPECT_THAT(store_->Open(SampleCaseKey(record.sha256), 0).status(), StatusIs(Code::kNotFound));
 }
 
-TEST_P(CaseStoreContractTest, ThereAreNoMoreThanMayBe) {
+TEST_P(CaseStoreContractTest, LimitsTheNumberOfCases) {
   const std::string first = SampleCase(1);
   const std::string second = SampleCase(2);
   // Both begin where there is room for one.
@@ -161,7 +161,7 @@ TEST_P(CaseStoreContractTest, ThereAreNoMoreThanMayBe) {
   EXPECT_THAT(KeepCase(*store_, CaseRecordOf(second), second, 1), IsOk());
 }
 
-TEST_P(CaseStoreContractTest, AReaderReadsOnWhenItsCaseIsDeleted) {
+TEST_P(CaseStoreContractTest, ReaderContinuesAfterItsCaseIsDeleted) {
   const std::string name = Keep(1);
   ASSERT_OK_AND_ASSIGN(const auto reader, store_->Open(SampleCaseKey(name), 0));
   ASSERT_THAT(store_->Delete(SampleCaseKey(name)), IsOk());
@@ -222,7 +222,7 @@ TEST_P(CaseStoreContractTest, APageMayHoldNamedCasesOfOthers) {
   EXPECT_EQ(found, names);
 }
 
-TEST_P(CaseStoreContractTest, ThoseThatNobodyUsedGoOldestFirstButNotSparedOnes) {
+TEST_P(CaseStoreContractTest, RemovesUnusedCasesOldestFirstExceptSparedOnes) {
   const std::string a = Keep(1, 1000);
   const std::string b = Keep(2, 900);
   const std::string c = Keep(3, 800);

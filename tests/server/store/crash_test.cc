@@ -74,7 +74,7 @@ void ExpectAllAcknowledged(const std::string& path, const Death& death) {
 
 class FaultPointTest : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(FaultPointTest, WhatWasAcknowledgedIsThereAfterAKill) {
+TEST_P(FaultPointTest, AcknowledgedDataSurvivesAKill) {
   // The first time it may be passed while the store is made; the others come in later rounds.
   for (const int count : {1, 4}) {
     const ScratchFolder scratch;
@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 // TISSUEFORM_CRASHES: how many moments, 20 unless given.
-TEST(CrashTest, WhatWasAcknowledgedIsThereAfterAKillAtAnyMoment) {
+TEST(CrashTest, AcknowledgedDataSurvivesAKillAtAnyMoment) {
   int crashes = 20;
   if (const char* given = std::getenv("TISSUEFORM_CRASHES")) {
     ASSERT_TRUE(absl::SimpleAtoi(given, &crashes));

@@ -86,7 +86,7 @@ TEST_F(DurableCaseStoreTest, CasesAreThereAfterARestart) {
   EXPECT_EQ(record.created_s, 1234);
 }
 
-TEST_F(DurableCaseStoreTest, WhatWasDeletedIsNowhereInItsFiles) {
+TEST_F(DurableCaseStoreTest, DeletedCasesLeaveNoTraceInItsFiles) {
   const std::string bytes = SampleCase(1);
   CaseRecord record = CaseRecordOf(bytes);
   record.title = "a name that nobody shall find";
@@ -101,7 +101,7 @@ TEST_F(DurableCaseStoreTest, WhatWasDeletedIsNowhereInItsFiles) {
   ExpectCase(2);
 }
 
-TEST_F(DurableCaseStoreTest, OneThatABreakdownLeftHalfWrittenGoesAtTheStart) {
+TEST_F(DurableCaseStoreTest, StartRemovesACaseHalfWrittenAtACrash) {
   Keep(1);
   const std::string bytes = SampleCase(2);
   ASSERT_OK_AND_ASSIGN(auto writer, store_->cases().Begin(CaseRecordOf(bytes), 100));
@@ -119,7 +119,7 @@ TEST_F(DurableCaseStoreTest, OneThatABreakdownLeftHalfWrittenGoesAtTheStart) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
-TEST_F(DurableCaseStoreTest, ADamagedOneIsSetAsideAtTheStartAndMayBeSentAgain) {
+TEST_F(DurableCaseStoreTest, StartSetsDamagedCasesAsideAndAllowsSendingAgain) {
   const std::string flipped = Keep(1);
   const std::string gone = Keep(2);
   const std::string cut = Keep(3);
@@ -150,7 +150,7 @@ TEST_F(DurableCaseStoreTest, ADamagedOneIsSetAsideAtTheStartAndMayBeSentAgain) {
   EXPECT_THAT(Damaged(), IsEmpty()) << "reported once";
 }
 
-TEST_F(DurableCaseStoreTest, OneThatIsDamagedWhileItServesIsFoundWhenItIsRead) {
+TEST_F(DurableCaseStoreTest, CaseDamagedDuringServiceIsDetectedWhenRead) {
   const std::string flipped = Keep(1);
   const std::string gone = Keep(2);
   const std::string cut = Keep(3);
@@ -166,7 +166,7 @@ TEST_F(DurableCaseStoreTest, OneThatIsDamagedWhileItServesIsFoundWhenItIsRead) {
   ExpectCase(4);
 }
 
-TEST_F(DurableCaseStoreTest, OneThatIsCutWhileItIsReadIsNotTakenForWhole) {
+TEST_F(DurableCaseStoreTest, CaseTruncatedDuringAReadIsDataLoss) {
   const std::string name = Keep(1);
   ASSERT_OK_AND_ASSIGN(const auto reader, store_->cases().Open(SampleCaseKey(name), 0));
   ASSERT_THAT(reader->Read(0, 1000), IsOk());

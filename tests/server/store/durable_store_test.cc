@@ -131,7 +131,7 @@ TEST_F(DurableStoreTest, EverythingIsThereAfterARestart) {
   EXPECT_EQ(committed, 4);
 }
 
-TEST_F(DurableStoreTest, NobodyElseMayReadItsFiles) {
+TEST_F(DurableStoreTest, FilesAreAccessibleOnlyToTheirOwner) {
   ASSERT_THAT(Open(), IsOk());
   Fill(1);
   const auto others = std::filesystem::perms::group_all | std::filesystem::perms::others_all;
@@ -452,7 +452,7 @@ TEST_F(DurableStoreTest, ABlockingCallFromAnAnswerIsRefusedAndNoDeadlock) {
   EXPECT_THAT(answer.get_future().get(), StatusIs(absl::StatusCode::kInternal));
 }
 
-TEST_F(DurableStoreTest, AReadDoesNotWaitForWhatIsBeingCommitted) {
+TEST_F(DurableStoreTest, ReadDoesNotWaitForARunningCommit) {
   ASSERT_THAT(Open(), IsOk());
   Fill(1);
   std::promise<void> begun;

@@ -50,7 +50,7 @@ TEST_P(ExportStoreContractTest, ThereIsNothingAtFirst) {
   EXPECT_THAT(store_->Erase({"none"}), IsOk());
 }
 
-TEST_P(ExportStoreContractTest, WhatWasPutIsThereAsItWasPutLastAndInOrder) {
+TEST_P(ExportStoreContractTest, LoadsTheLastPutRecordsInOrder) {
   ASSERT_THAT(store_->Put(SampleExport("b")), IsOk());
   ASSERT_THAT(store_->Put(SampleExport("a")), IsOk());
   ExportRecord later = SampleExport("b");
@@ -61,7 +61,7 @@ TEST_P(ExportStoreContractTest, WhatWasPutIsThereAsItWasPutLastAndInOrder) {
   EXPECT_THAT(kept, ElementsAre(SampleExport("a"), later));
 }
 
-TEST_P(ExportStoreContractTest, WhatAnotherServerHasChangedIsNotOverwritten) {
+TEST_P(ExportStoreContractTest, DoesNotOverwriteAChangeOfAnotherServer) {
   SqlExportStore there(&stores_->database());
   ExportRecord record = SampleExport("a");
   ASSERT_THAT(store_->Put(record), IsOk());
@@ -78,7 +78,7 @@ TEST_P(ExportStoreContractTest, WhatAnotherServerHasChangedIsNotOverwritten) {
       << "what is gone does not come back";
 }
 
-TEST_P(ExportStoreContractTest, WhatIsErasedGoesAndNothingElse) {
+TEST_P(ExportStoreContractTest, ErasesOnlyTheGivenExports) {
   for (const char* id : {"a", "b", "c"}) ASSERT_THAT(store_->Put(SampleExport(id)), IsOk());
   ASSERT_THAT(store_->Erase({"a", "none", "c"}), IsOk());
   ASSERT_OK_AND_ASSIGN(const auto kept, store_->Load());

@@ -66,7 +66,7 @@ TEST_P(MeshStoreContractTest, AMeshIsFoundAndReadAsItWas) {
   EXPECT_EQ(read.View().Sha256(), record.sha256);
 }
 
-TEST_P(MeshStoreContractTest, WhatIsNotThereIsNotFound) {
+TEST_P(MeshStoreContractTest, MissingMeshIsNotFound) {
   const std::string name(64, 'a');
   EXPECT_THAT(store_->Find(name), StatusIs(absl::StatusCode::kNotFound, HasSubstr(name)));
   EXPECT_EQ(store_->Read(name).status().code(), absl::StatusCode::kNotFound);
@@ -121,7 +121,7 @@ TEST_P(MeshStoreContractTest, ListsByNamePageAfterPage) {
   EXPECT_THAT(store_->List("", 0), StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
-TEST_P(MeshStoreContractTest, WhatIsLongUnusedIsListedOldestFirst) {
+TEST_P(MeshStoreContractTest, ListsLongUnusedMeshesOldestFirst) {
   const std::string a = Put(1, 1000);
   const std::string b = Put(2, 900);
   const std::string c = Put(3, 800);

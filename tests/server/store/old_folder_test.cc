@@ -60,7 +60,7 @@ class OldFolderTest : public ::testing::Test {
   std::unique_ptr<DurableStore> store_;
 };
 
-TEST_F(OldFolderTest, FromBeforeThereWereCasesKeepsAllThatItHadAndTakesCases) {
+TEST_F(OldFolderTest, FolderWithoutCasesKeepsItsDataAndAcceptsCases) {
   constexpr int kSteps = 16;
   Copy(2, kSteps);
   ASSERT_FALSE(model_.predictions.empty());
@@ -76,7 +76,7 @@ TEST_F(OldFolderTest, FromBeforeThereWereCasesKeepsAllThatItHadAndTakesCases) {
   OpenAndCheck();
 }
 
-TEST_F(OldFolderTest, FromBeforeThereWereRightsKeepsAllAndTakesACaseOfEveryOwner) {
+TEST_F(OldFolderTest, FolderWithoutRightsKeepsItsDataAndAcceptsCasesPerOwner) {
   Copy(3, 17);
   ASSERT_THAT(model_.cases, SizeIs(1));
   ASSERT_NO_FATAL_FAILURE(OpenAndCheck());
@@ -88,7 +88,7 @@ TEST_F(OldFolderTest, FromBeforeThereWereRightsKeepsAllAndTakesACaseOfEveryOwner
   EXPECT_THAT(store_->cases().Find(others.key()), IsOk());
 }
 
-TEST_F(OldFolderTest, FromBeforeThereWereExportsKeepsAllAndTakesExports) {
+TEST_F(OldFolderTest, FolderWithoutExportsKeepsItsDataAndAcceptsExports) {
   Copy(4, 17);
   ASSERT_FALSE(model_.predictions.empty());
   ASSERT_NO_FATAL_FAILURE(OpenAndCheck());
@@ -96,7 +96,7 @@ TEST_F(OldFolderTest, FromBeforeThereWereExportsKeepsAllAndTakesExports) {
   OpenAndCheck();
 }
 
-TEST_F(OldFolderTest, FromBeforeSessionsNamedTheirMeshesKnowsThem) {
+TEST_F(OldFolderTest, FolderWithoutMeshNamesOfSessionsLearnsThem) {
   Copy(5, 17);
   ASSERT_NO_FATAL_FAILURE(OpenAndCheck());
   ASSERT_OK_AND_ASSIGN(const MeshStore::Page meshes, store_->meshes().List("", 100));
@@ -110,7 +110,7 @@ TEST_F(OldFolderTest, FromBeforeSessionsNamedTheirMeshesKnowsThem) {
   }
 }
 
-TEST_F(OldFolderTest, AnExportWithoutAVersionBesideItIsChangedOnce) {
+TEST_F(OldFolderTest, ExportWithoutAVersionColumnIsChangedOnlyOnce) {
   Copy(5, 17);
   ExportRecord record = {.id = "a", .prediction = "p", .version = 4};
   {

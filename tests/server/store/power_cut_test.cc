@@ -150,7 +150,7 @@ TEST_F(PowerCutTest, TheRecorderSeesEveryFile) {
   EXPECT_THAT(CheckAgainst(model, model, **store), IsOk());
 }
 
-TEST_F(PowerCutTest, WhatWasAcknowledgedIsThereAfterACutAtAnyOperation) {
+TEST_F(PowerCutTest, AcknowledgedDataSurvivesACutAtAnyOperation) {
   for (size_t cut = 0; cut <= ops.size(); ++cut) {
     ASSERT_THAT(AfterCut(cut, DiskImage::Kept::kNothing, {}), IsOk()) << cut;
     ASSERT_THAT(AfterCut(cut, DiskImage::Kept::kLastOfEachFile, {}), IsOk()) << cut;
@@ -170,7 +170,7 @@ bool IsDoneTwice(const DiskOp& sync, const DiskOp& next) {
   return IsSync(next) && next.file == sync.file && next.path == sync.path;
 }
 
-TEST_F(PowerCutTest, NoSyncCanBeTakenOut) {
+TEST_F(PowerCutTest, EverySyncIsNeeded) {
   int taken_out = 0;
   for (const size_t sync : syncs) {
     if (sync < opened_at || IsHeaderOfEmptyLog(ops[sync - 1])) continue;
@@ -183,7 +183,7 @@ TEST_F(PowerCutTest, NoSyncCanBeTakenOut) {
 
 // Until the store is open nothing is promised, so syncs of one folder are taken out together; those
 // of files protect nothing yet.
-TEST_F(PowerCutTest, NoFoldersSyncsCanBeTakenOutOfTheStart) {
+TEST_F(PowerCutTest, EveryFolderSyncOfTheStartIsNeeded) {
   std::map<std::string, std::set<size_t>> folders;
   for (const size_t sync : syncs) {
     if (sync < opened_at && ops[sync].kind == DiskOp::Kind::kSyncFolder) {
@@ -194,7 +194,7 @@ TEST_F(PowerCutTest, NoFoldersSyncsCanBeTakenOutOfTheStart) {
   for (const auto& [path, without] : folders) EXPECT_TRUE(IsMissed(without)) << path;
 }
 
-TEST(FullDiskTest, WhatDoesNotFitIsRefusedAndTheRestStaysAndGoesOn) {
+TEST(FullDiskTest, RefusesWritesOnAFullDiskAndKeepsServing) {
   for (const int64_t room : {0, 100, 3000, 20000}) {
     const ScratchFolder scratch;
     const std::string path = scratch / "data";
@@ -226,7 +226,7 @@ TEST(FullDiskTest, WhatDoesNotFitIsRefusedAndTheRestStaysAndGoesOn) {
   }
 }
 
-TEST(FullDiskTest, AStoreThatDoesNotFitAtAllSaysSo) {
+TEST(FullDiskTest, ReportsADiskTooFullForAStore) {
   const ScratchFolder scratch;
   auto folder = DataFolder::Open(scratch / "data");
   ASSERT_THAT(folder, IsOk());

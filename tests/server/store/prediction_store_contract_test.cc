@@ -51,13 +51,13 @@ TEST_P(PredictionStoreContractTest, APredictionIsFoundAsItWas) {
   EXPECT_EQ(read, positions);
 }
 
-TEST_P(PredictionStoreContractTest, WhatIsNotThereIsNotFound) {
+TEST_P(PredictionStoreContractTest, MissingPredictionIsNotFound) {
   EXPECT_THAT(store_->Get("p"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("p")));
   EXPECT_THAT(store_->Positions("p"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("p")));
   EXPECT_THAT(store_->Delete("p"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("p")));
 }
 
-TEST_P(PredictionStoreContractTest, WhatDoesNotFitIsRefused) {
+TEST_P(PredictionStoreContractTest, RefusesInvalidOrDuplicatePredictions) {
   EXPECT_THAT(store_->Create(SamplePrediction(""), SamplePositions(1)),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("id")));
   EXPECT_THAT(store_->Create(SamplePrediction("p"), SamplePositions(1, 39)),

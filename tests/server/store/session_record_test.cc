@@ -113,7 +113,7 @@ TEST(SessionRecordTest, DamagedBytesAreDataLossAndNeverACrash) {
   }
 }
 
-TEST(SessionRecordTest, WhatDoesNotAgreeWithItselfIsDamaged) {
+TEST(SessionRecordTest, InconsistentRecordIsDataLoss) {
   const auto damaged = [](auto change, const char* text) {
     SessionRecord record = SomeRecord();
     change(record);

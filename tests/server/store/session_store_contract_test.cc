@@ -84,7 +84,7 @@ class SessionStoreContractTest : public ::testing::TestWithParam<StoresCase> {
   SessionStore* const store_ = &stores_->sessions();
 };
 
-TEST_P(SessionStoreContractTest, WhatWasCreatedIsFoundAsItWas) {
+TEST_P(SessionStoreContractTest, CreatedSessionIsFoundUnchanged) {
   SessionRecord record = Record("a", "planner");
   record.project = "study";
   record.stiffness = "youngs_modulus_pa";
@@ -104,7 +104,7 @@ TEST_P(SessionStoreContractTest, WhatWasCreatedIsFoundAsItWas) {
   EXPECT_EQ(found.epoch, 4);
 }
 
-TEST_P(SessionStoreContractTest, WhatWasNeverThereIsNotFound) {
+TEST_P(SessionStoreContractTest, MissingSessionIsNotFound) {
   EXPECT_THAT(Get("a"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("a")));
   EXPECT_THAT(Update(Record("a")), StatusIs(absl::StatusCode::kNotFound, HasSubstr("a")));
   EXPECT_THAT(Delete("a"), StatusIs(absl::StatusCode::kNotFound, HasSubstr("a")));
@@ -159,7 +159,7 @@ TEST_P(SessionStoreContractTest, TheSameContentAgainIsAnotherVersion) {
   EXPECT_THAT(Update(first), StatusIs(absl::StatusCode::kAborted, HasSubstr("changed")));
 }
 
-TEST_P(SessionStoreContractTest, ARecordThatIsMadeAnewDoesNotTakeItsOldEtags) {
+TEST_P(SessionStoreContractTest, RecreatedRecordDoesNotAcceptOldEtags) {
   ASSERT_OK_AND_ASSIGN(const SessionRecord before, Create(Record("a")));
   ASSERT_THAT(Delete("a"), IsOk());
   ASSERT_THAT(Create(Record("a")), IsOk());
@@ -177,7 +177,7 @@ TEST_P(SessionStoreContractTest, AnOlderEpochIsRefusedWhateverItsEtag) {
   EXPECT_THAT(Update(record, 6), IsOk()) << "the owner goes on";
 }
 
-TEST_P(SessionStoreContractTest, WhatWasDeletedIsGone) {
+TEST_P(SessionStoreContractTest, DeletedSessionIsGone) {
   ASSERT_OK_AND_ASSIGN(const SessionRecord record, Create(Record("a")));
   ASSERT_THAT(Create(Record("b")), IsOk());
   EXPECT_THAT(Delete("a", record.etag), IsOk());
@@ -329,7 +329,7 @@ TEST_P(SessionStoreContractTest, ACommitThatDoesNotFitIsRefused) {
       << "a commit is a write under its epoch";
 }
 
-TEST_P(SessionStoreContractTest, TimesAreTheStoresAndNeverGoBack) {
+TEST_P(SessionStoreContractTest, StoreSetsTimesThatNeverGoBack) {
   SessionRecord record = Record("a");
   record.created_s = 1;
   record.last_used_s = 5000;
@@ -348,7 +348,7 @@ TEST_P(SessionStoreContractTest, TimesAreTheStoresAndNeverGoBack) {
   EXPECT_EQ(record.created_s, 1000);
 }
 
-TEST_P(SessionStoreContractTest, WhatIsLongUnusedIsListedOldestFirst) {
+TEST_P(SessionStoreContractTest, ListsLongUnusedSessionsOldestFirst) {
   for (const char* id : {"a", "b", "c", "d"}) {
     ASSERT_THAT(Create(Record(id, id)), IsOk());
   }

@@ -51,7 +51,7 @@ class UploadStoreTest : public ::testing::Test {
   const std::string bytes_ = BytesOf(mesh_);
 };
 
-TEST_F(UploadStoreTest, WhatArrivesInPiecesIsTakenWhole) {
+TEST_F(UploadStoreTest, AssemblesAnUploadFromPieces) {
   ASSERT_OK_AND_ASSIGN(const int64_t begin, store_->Begin(announcement_));
   EXPECT_EQ(begin, 0);
   for (size_t offset = 0; offset < bytes_.size(); offset += 1000) {
@@ -83,7 +83,7 @@ TEST_F(UploadStoreTest, APartGoesOnAfterARestart) {
   EXPECT_EQ(payload.View().Sha256(), name_);
 }
 
-TEST_F(UploadStoreTest, AfterSomeTimeWhatCameIsSyncedUnasked) {
+TEST_F(UploadStoreTest, SyncsReceivedDataPeriodically) {
   Reopen({.sync_every = std::chrono::milliseconds(0)});
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Append(name_, 0, bytes_.substr(0, 5000)), IsOk());
@@ -92,7 +92,7 @@ TEST_F(UploadStoreTest, AfterSomeTimeWhatCameIsSyncedUnasked) {
   EXPECT_EQ(committed, 5000);
 }
 
-TEST_F(UploadStoreTest, AfterARestartNothingStandsBehindTheLastSync) {
+TEST_F(UploadStoreTest, RestartDropsDataAfterTheLastSync) {
   Reopen({.sync_every = std::chrono::hours(1)});
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Append(name_, 0, bytes_.substr(0, 5000)), IsOk());
@@ -104,7 +104,7 @@ TEST_F(UploadStoreTest, AfterARestartNothingStandsBehindTheLastSync) {
   EXPECT_EQ(std::filesystem::file_size(folder_ / "uploads/" + name_ + ".part"), 5000);
 }
 
-TEST_F(UploadStoreTest, AnotherAnnouncementOfTheSameNameBeginsAnew) {
+TEST_F(UploadStoreTest, DifferentAnnouncementOfTheSameNameRestartsTheUpload) {
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   ASSERT_THAT(store_->Append(name_, 0, bytes_.substr(0, 5000)), IsOk());
   UploadAnnouncement other = AnnouncementOf(SamplePayload(1, 100));
@@ -161,7 +161,7 @@ TEST_F(UploadStoreTest, AllPartsTogetherHaveALimit) {
   EXPECT_THAT(store_->Append(second.sha256, 0, "01234"), IsOk()) << "what was dropped is free";
 }
 
-TEST_F(UploadStoreTest, WhatCannotBeTakenUpIsRemovedAndTheRestServes) {
+TEST_F(UploadStoreTest, RemovesUnusablePartsAndKeepsTheRest) {
   for (int number = 1; number <= 4; ++number) {
     const MeshPayload mesh = SamplePayload(number, 2000);
     ASSERT_THAT(store_->Begin(AnnouncementOf(mesh)), IsOk());
@@ -203,7 +203,7 @@ TEST_F(UploadStoreTest, OldPartsAreRemovedAndFreshOnesStay) {
   EXPECT_EQ(Files(), 2);
 }
 
-TEST_F(UploadStoreTest, WhereThereIsNoPlaceTheOldestGoAndWhatWasLatelySentStays) {
+TEST_F(UploadStoreTest, RemovesTheOldestPartsWhenFullAndKeepsRecentOnes) {
   Reopen({.max_parts = 3});
   const std::string oldest = RecordOf(SamplePayload(2)).sha256;
   const std::string older = RecordOf(SamplePayload(3)).sha256;
@@ -229,7 +229,7 @@ TEST_F(UploadStoreTest, WhereThereIsNoPlaceTheOldestGoAndWhatWasLatelySentStays)
   EXPECT_EQ(Files(), 6);
 }
 
-TEST_F(UploadStoreTest, OfTwoStreamsThatSendTheSameBytesOneIsRefused) {
+TEST_F(UploadStoreTest, RefusesAllButOneStreamSendingTheSameBytes) {
   ASSERT_THAT(store_->Begin(announcement_), IsOk());
   std::vector<absl::Status> results(4);
   std::vector<std::thread> threads;

@@ -80,7 +80,7 @@ class AuditObserverTest : public ::testing::Test {
   std::optional<AuditObserver> observer_;
 };
 
-TEST_F(AuditObserverTest, ACallIsOneLineWithWhoWhatFromWhereAndHowItEnded) {
+TEST_F(AuditObserverTest, LogsACallInOneLineWithCallerAddressAndOutcome) {
   EXPECT_THAT(Run("SessionService.GetSession", absl::NotFoundError("PLANTED")), IsOk());
   const auto lines = Lines();
   ASSERT_EQ(lines.size(), 1);
@@ -135,7 +135,7 @@ TEST_F(AuditObserverTest, WithoutAPlaceForItsLineACallIsRefused) {
   EXPECT_THAT(observer_->OnBegin(Call("SessionService.GetSession", false)), IsOk());
 }
 
-TEST_F(AuditObserverTest, WhileTheSinkTakesNothingCallsAreRefusedAndAfterwardsNothingIsMissing) {
+TEST_F(AuditObserverTest, BlockedSinkRefusesCallsAndLosesNothing) {
   EXPECT_THAT(observer_->OnBegin(Call("DeformService.Deform", false)), IsOk());
   ASSERT_TRUE(log_->Flush());
   record_.Limit(0);
@@ -152,7 +152,7 @@ TEST_F(AuditObserverTest, WhileTheSinkTakesNothingCallsAreRefusedAndAfterwardsNo
   EXPECT_THAT(Run("SessionService.GetSession"), IsOk());
 }
 
-TEST_F(AuditObserverTest, LostEventsAreAnEvent) {
+TEST_F(AuditObserverTest, ReportsLostEventsAsAnEvent) {
   const auto event = nlohmann::json::parse(AuditObserver::LostEvent(3));
   EXPECT_EQ(event.at("event"), "lost");
   EXPECT_EQ(event.at("count"), 3);

@@ -82,7 +82,7 @@ TEST_F(CallMetricsTest, ACallIsOpenUntilItEnds) {
   EXPECT_THAT(page_.Text(), HasSubstr("tissueform_calls_open{rpc=\"DeformService.Deform\"} 0\n"));
 }
 
-TEST_F(CallMetricsTest, WhoIsNotKnownIsCountedByReasonAndWasNeverOpen) {
+TEST_F(CallMetricsTest, CountsUnauthenticatedCallsByReasonAndNotAsOpen) {
   Call("MeshService.GetMesh", absl::UnauthenticatedError("no token"), /*served=*/false);
   EXPECT_THAT(
       page_.Text(),

@@ -57,7 +57,7 @@ class DeviceLoginTest : public ::testing::Test {
                      [this](seconds time) { waits_.push_back(time); }};
 };
 
-TEST_F(DeviceLoginTest, WaitsUntilTheUserHasGoneTheWay) {
+TEST_F(DeviceLoginTest, PollsUntilTheUserHasLoggedIn) {
   answers_.insert(answers_.end(), {Error("authorization_pending"), Error("slow_down"),
                                    absl::UnavailableError("away for a moment"),
                                    HttpAnswer{.status = 200, .body = kTokens}});
@@ -94,7 +94,7 @@ TEST_F(DeviceLoginTest, RefusalByUserIsReported) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("access_denied"));
 }
 
-TEST_F(DeviceLoginTest, RenewsAndKeepsTheRefreshTokenWhereNoneComes) {
+TEST_F(DeviceLoginTest, RenewalKeepsTheRefreshTokenIfNoNewOneArrives) {
   answers_ = {HttpAnswer{.status = 200, .body = kDiscovery},
               HttpAnswer{.status = 200, .body = R"({"access_token": "new"})"}};
   const auto tokens = login_.Renew("old");
@@ -110,7 +110,7 @@ TEST_F(DeviceLoginTest, ARefusedRenewalIsARefusal) {
   EXPECT_EQ(login_.Renew("old").status().code(), absl::StatusCode::kPermissionDenied);
 }
 
-TEST_F(DeviceLoginTest, AProviderOfAnotherNameIsNamedWithTheExpectedOne) {
+TEST_F(DeviceLoginTest, IssuerMismatchNamesBothIssuers) {
   answers_ = {HttpAnswer{
       .status = 200, .body = R"({"issuer": "https://b/", "token_endpoint": "https://b/token"})"}};
   EXPECT_THAT(

@@ -37,7 +37,7 @@ TEST(CheckLoginUrl, RefusesWhereSecretsWouldBeSeen) {
   }
 }
 
-TEST(AskProvider, SaysWhoCannotBeAskedAndNotWhat) {
+TEST(AskProvider, ConnectionErrorNamesTheHostButNotTheUrl) {
   // Port 9 of loopback: no process listens there.
   const auto answer =
       AskProvider({.url = "http://127.0.0.1:9/?secret", .form = {{"code", "secret"}}});
@@ -46,7 +46,7 @@ TEST(AskProvider, SaysWhoCannotBeAskedAndNotWhat) {
   EXPECT_THAT(std::string(answer.status().message()), ::testing::Not(HasSubstr("secret")));
 }
 
-TEST(AskProvider, TakesNoMoreThanAnAnswerMayBe) {
+TEST(AskProvider, RefusesAnAnswerAboveTheSizeLimit) {
   const std::string head = "HTTP/1.1 200 OK\r\n\r\n";
   OneAnswer fits(head + std::string(200 << 10, 'x'));
   EXPECT_EQ(AskProvider({.url = fits.url()})->body.size(), size_t{200} << 10);
@@ -58,7 +58,7 @@ TEST(AskProvider, TakesNoMoreThanAnAnswerMayBe) {
   large.Request();
 }
 
-TEST(AskProvider, SendsAFormWhoseValuesStayValues) {
+TEST(AskProvider, EscapesFormValues) {
   OneAnswer server("HTTP/1.1 400 Bad Request\r\ncontent-length: 2\r\n\r\n{}", "c=%C3%A4");
   const auto answer = AskProvider({.url = server.url(), .form = {{"a", "1&b=2"}, {"c", "ä"}}});
   EXPECT_EQ(answer->status, 400);

@@ -26,7 +26,7 @@ using Permissions = std::filesystem::perms;
 
 using TokenCommandTest = CliTest;
 
-TEST_F(TokenCommandTest, OnlyItsOwnerReadsAPrivateKeyAndNothingIsWrittenOver) {
+TEST_F(TokenCommandTest, PrivateKeyIsOwnerOnlyAndNeverOverwritten) {
   EXPECT_THAT(Run({"token", "keygen", "--out", Path("keys")}), Succeeds());
   EXPECT_EQ(std::filesystem::status(Path("keys/private.pem")).permissions(),
             Permissions::owner_read | Permissions::owner_write);
@@ -56,7 +56,7 @@ TEST_F(TokenCommandTest, TokenHoldsRequestedClaimsAndIsUnique) {
   EXPECT_NE(make().out, made.out);
 }
 
-TEST_F(TokenCommandTest, AFileIsShownInWordsWithoutItsSignature) {
+TEST_F(TokenCommandTest, ShowsTheClaimsOfAFileWithoutItsSignature) {
   ASSERT_THAT(Run({"token", "keygen", "--out", Path("keys")}), Succeeds());
   const ProcessResult made =
       Run({"token", "make", "--key", Path("keys/private.pem"), "--issuer", "i", "--audience", "a",
@@ -87,13 +87,13 @@ TEST_F(TokenCommandTest, AFileThatHoldsNoTokenIsNamed) {
   EXPECT_THAT(Run({"token", "show", Path("keys")}), FailsWith(1, HasSubstr("cannot read")));
 }
 
-TEST_F(TokenCommandTest, NoTokenLivesLongerThanItMay) {
+TEST_F(TokenCommandTest, RefusesALifetimeAboveTheMaximum) {
   EXPECT_THAT(Run({"token", "make", "--key", "k", "--issuer", "i", "--audience", "a", "--subject",
                    "s", "--lifetime", "43201"}),
               FailsWith(2, HasSubstr("--lifetime")));
 }
 
-TEST_F(TokenCommandTest, APublicKeyMakesNoToken) {
+TEST_F(TokenCommandTest, PublicKeyCannotMakeAToken) {
   ASSERT_THAT(Run({"token", "keygen", "--out", Path("keys"), "--rsa", "2048"}), Succeeds());
   for (const char* key : {"keys/public.pem", "keys/jwks.json", "keys/none"}) {
     EXPECT_THAT(Run({"token", "make", "--key", Path(key), "--issuer", "i", "--audience", "a",

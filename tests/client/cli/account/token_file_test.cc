@@ -38,7 +38,7 @@ class TokenFileTest : public ::testing::Test {
       .issuer = "https://a", .client_id = "tissueform", .audience = "x", .scopes = "openid"};
 };
 
-TEST_F(TokenFileTest, IsForItsOwnerAlone) {
+TEST_F(TokenFileTest, IsAccessibleOnlyToItsOwner) {
   const mode_t before = umask(0);
   ASSERT_TRUE(KeepLogin(path_, client_, {.access_token = "one", .refresh_token = "two"}).ok());
   umask(before);
@@ -50,7 +50,7 @@ TEST_F(TokenFileTest, IsForItsOwnerAlone) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "tissueform"), {}), 2);
 }
 
-TEST_F(TokenFileTest, WhatALoginLeavesIsReadAgain) {
+TEST_F(TokenFileTest, ReadsBackASavedLogin) {
   ASSERT_TRUE(KeepLogin(path_, client_, {.access_token = "one", .refresh_token = "two"}).ok());
   const auto login = ReadLogin(path_);
   ASSERT_TRUE(login.ok()) << login.status();
@@ -61,20 +61,20 @@ TEST_F(TokenFileTest, WhatALoginLeavesIsReadAgain) {
   EXPECT_EQ(login->client.scopes, "openid");
 }
 
-TEST_F(TokenFileTest, ALoginWithoutRenewalLeavesNoneOfTheOneBefore) {
+TEST_F(TokenFileTest, LoginWithoutRefreshTokenRemovesThePreviousOne) {
   ASSERT_TRUE(KeepLogin(path_, client_, {.access_token = "one", .refresh_token = "two"}).ok());
   ASSERT_TRUE(KeepLogin(path_, client_, {.access_token = "three"}).ok());
   EXPECT_EQ(ReadAll(path_), "three\n");
   EXPECT_EQ(ReadLogin(path_).status().code(), absl::StatusCode::kNotFound);
 }
 
-TEST_F(TokenFileTest, WhatOthersMayReadIsNotUsed) {
+TEST_F(TokenFileTest, RefusesALoginFileThatOthersMayRead) {
   ASSERT_TRUE(KeepLogin(path_, client_, {.access_token = "one", .refresh_token = "two"}).ok());
   fs::permissions(renewal_, fs::perms::group_read, fs::perm_options::add);
   EXPECT_EQ(ReadLogin(path_).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-TEST_F(TokenFileTest, WhatIsDamagedIsSaidToBe) {
+TEST_F(TokenFileTest, ReportsADamagedLoginFile) {
   ASSERT_TRUE(KeepLogin(path_, client_, {.access_token = "one", .refresh_token = "two"}).ok());
   for (const std::string& text :
        {std::string(), std::string("{"), std::string("[1]"), std::string(R"({"issuer": 3})"),

@@ -164,7 +164,7 @@ TEST_F(CasePackTest, APlanWithoutViewerShowsItsMesh) {
   EXPECT_TRUE(contents.landmarks.empty());
 }
 
-TEST_F(CasePackTest, RangesOfTheMaterialAreTakenAlong) {
+TEST_F(CasePackTest, IncludesTheMaterialRanges) {
   const std::string plan = CopyOf("bar");
   std::string text = Read("bar/plan.json");
   const size_t version = text.find("\"version\": 1");
@@ -193,7 +193,7 @@ TEST_F(CasePackTest, DamagedSurfacesAreRefusedByName) {
               FailsWith(1, AllOf(HasSubstr("viewer.glb"), HasSubstr("glTF"))));
 }
 
-TEST_F(CasePackTest, ACaseIsNotReplacedUnasked) {
+TEST_F(CasePackTest, DoesNotReplaceACaseWithoutOverwrite) {
   const std::string plan = TestDataPath("plans/bar/plan.json");
   Write("packed.tfcase", "mine");
   EXPECT_THAT(Run({"case", "pack", plan, "--out", "packed.tfcase"}),
@@ -202,7 +202,7 @@ TEST_F(CasePackTest, ACaseIsNotReplacedUnasked) {
   EXPECT_THAT(Packed(plan, {"--overwrite"}), IsOk());
 }
 
-TEST_F(CasePackTest, ATitleIsTextAndTheFoldersNameIsNone) {
+TEST_F(CasePackTest, TitleIsPlainTextAndNotTheFolderName) {
   const std::string plan = CopyOf("bar");
   ASSERT_OK_AND_ASSIGN(const CaseFile titled, Packed(plan, {"--title", "<b>Jaw</b>"}));
   EXPECT_EQ(titled.title, "<b>Jaw</b>");

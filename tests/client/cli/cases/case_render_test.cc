@@ -72,7 +72,7 @@ TEST_F(CaseRenderTest, PositionsOfAnotherMeshAreRefused) {
   EXPECT_FALSE(std::filesystem::exists(Path("pictures")));
 }
 
-TEST_F(CaseRenderTest, APositionThatIsNoNumberIsRefused) {
+TEST_F(CaseRenderTest, RefusesAPositionThatIsNotANumber) {
   std::string positions = MovedPositions();
   ASSERT_FALSE(positions.empty());
   positions.replace(0, 4, "\xff\xff\xff\xff");

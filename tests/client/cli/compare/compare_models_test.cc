@@ -26,7 +26,7 @@ class CompareModelsTest : public CliTest {
   static std::string BarPlan() { return TestDataPath("plans/bar/plan.json"); }
 };
 
-TEST_F(CompareModelsTest, AllModelsAreComparedWithTheNeoHookeanOneUnlessSaid) {
+TEST_F(CompareModelsTest, ComparesAllModelsWithNeoHookeanByDefault) {
   const ProcessResult result = Run({"compare", BarPlan(), "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const nlohmann::json json = nlohmann::json::parse(result.out);
@@ -110,7 +110,7 @@ TEST_F(CompareModelsTest, TableHasABlockForEachModelButTheReference) {
                                 HasSubstr("\nhandle top "), Not(HasSubstr("linear_elastic"))));
 }
 
-TEST_F(CompareModelsTest, OptionsOfTheOtherKindAreWrongUse) {
+TEST_F(CompareModelsTest, OptionsOfTheOtherModeAreAUsageError) {
   EXPECT_THAT(Run({"compare", BarPlan(), "b.vtu"}), FailsWith(2, HasSubstr("B")));
   EXPECT_THAT(Run({"compare", BarPlan(), "--by", "anatomy"}), FailsWith(2, HasSubstr("--by")));
   EXPECT_THAT(Run({"compare", BarPlan(), "--out", "difference.vtu"}),
@@ -123,7 +123,7 @@ TEST_F(CompareModelsTest, OptionsOfTheOtherKindAreWrongUse) {
   EXPECT_THAT(Run({"compare", BarPlan(), "--models", "rubber"}), FailsWith(2, HasSubstr("rubber")));
 }
 
-TEST_F(CompareModelsTest, FolderThatCannotBeMadeIsSaidBeforeTheWork) {
+TEST_F(CompareModelsTest, ReportsAnUnusableFolderBeforeStarting) {
   Write("taken", "");
   EXPECT_THAT(Run({"compare", BarPlan(), "--out", "taken"}), FailsWith(1, HasSubstr("taken")));
 }

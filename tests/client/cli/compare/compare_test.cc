@@ -62,7 +62,7 @@ TEST_F(CompareTest, DifferenceFileHoldsTheDistances) {
   EXPECT_NE(FindAttribute(file.point_data, "anatomy"), nullptr);
 }
 
-TEST_F(CompareTest, DifferenceFileHoldsWhatLeadsFromAToB) {
+TEST_F(CompareTest, DifferenceFileHoldsTheVectorsFromAToB) {
   ASSERT_THAT(Run({"compare", "a.vtu", "b.vtu", "--out", "difference.vtu"}), Succeeds());
   ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(Path("difference.vtu")));
   const Attribute* difference = FindAttribute(file.point_data, "difference_mm");

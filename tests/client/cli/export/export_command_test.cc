@@ -54,7 +54,7 @@ class ExportCommandTest : public CliTest {
   }
 };
 
-TEST_F(ExportCommandTest, TheFileIsWholeItsOwnersAndSaysNothingOfThePlan) {
+TEST_F(ExportCommandTest, FileIsCompleteOwnerOnlyAndOmitsThePlan) {
   const ProcessResult result = Export({});
   ASSERT_THAT(result, Succeeds());
   EXPECT_THAT(result.out, AllOf(HasSubstr("not encrypted"), HasSubstr("not a medical device"),
@@ -66,7 +66,7 @@ TEST_F(ExportCommandTest, TheFileIsWholeItsOwnersAndSaysNothingOfThePlan) {
             fs::perms::owner_read | fs::perms::owner_write);
 }
 
-TEST_F(ExportCommandTest, AnOlderFileStaysUnlessOneAsks) {
+TEST_F(ExportCommandTest, KeepsAnExistingFileWithoutOverwrite) {
   Write("t.html", "old");
   EXPECT_THAT(Export({}), FailsWith(1, AllOf(HasSubstr("t.html"), HasSubstr("--overwrite"))));
   EXPECT_EQ(Read("t.html"), "old");
@@ -74,7 +74,7 @@ TEST_F(ExportCommandTest, AnOlderFileStaysUnlessOneAsks) {
   EXPECT_GT(Read("t.html").size(), 100'000U);
 }
 
-TEST_F(ExportCommandTest, WhatCannotBeMadeSaysWhyAndLeavesNothing) {
+TEST_F(ExportCommandTest, FailedExportSaysWhyAndLeavesNoFile) {
   EXPECT_THAT(Export({"--segments", "nose"}),
               FailsWith(1, AllOf(HasSubstr("\"nose\""), HasSubstr("it has "))));
   EXPECT_THAT(Export({"--model", "arap"}),
@@ -92,7 +92,7 @@ TEST_F(ExportCommandTest, WhatCannotBeMadeSaysWhyAndLeavesNothing) {
 }
 
 // Answers of gradient_field are prepared up to 30 degrees.
-TEST_F(ExportCommandTest, APlanBeyondWhatTheModelReachesIsRefusedWithAnotherModel) {
+TEST_F(ExportCommandTest, PlanOutOfTheModelsRangeSuggestsAnotherModel) {
   const std::string folder = SourcePath("tests/data/plans/tongue/");
   std::string plan = Read(folder + "plan.json");
   const auto replace = [&plan](const std::string& from, const std::string& to) {
@@ -111,7 +111,7 @@ TEST_F(ExportCommandTest, APlanBeyondWhatTheModelReachesIsRefusedWithAnotherMode
               Succeeds());
 }
 
-TEST_F(ExportCommandTest, ATitleIsWarnedOfAndUnderAPasswordNotReadable) {
+TEST_F(ExportCommandTest, WarnsAboutATitleAndEncryptsItWithAPassword) {
   Write("password", "correct horse battery");
   const ProcessResult result = Export({"--title", "Chin forward", "--password-file", "password"});
   EXPECT_EQ(result.exit_code, 0) << result.err;

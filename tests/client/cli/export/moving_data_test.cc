@@ -67,7 +67,7 @@ TEST(MovingDataTest, TheBytesAreThoseThatThePlannerReads) {
   EXPECT_EQ(bytes, ReadGolden());
 }
 
-TEST(MovingDataTest, WhatIsFollowedBecomesPlacesInAListWithoutTheRest) {
+TEST(MovingDataTest, FollowedVerticesAreReindexedIntoACompactList) {
   std::vector<CaseSurface> surfaces = SmallSurfaces();
   // 11 and 5 have no weight.
   EXPECT_THAT(FollowedVerticesOf(&surfaces), ElementsAre(3, 7, 9, 40));
@@ -85,7 +85,7 @@ TEST(MovingDataTest, PartsBeginAtMultiplesOfSixteen) {
   }
 }
 
-TEST(MovingDataTest, NothingIsTakenOfACaseButWhatIsListed) {
+TEST(MovingDataTest, HoldsOnlyTheListedPartsOfACase) {
   const std::string bytes = WriteMovingData(SmallData());
   for (const char* word : {"created", "plan_sha256", "commit", "meshes/", "landmark", "regions"}) {
     EXPECT_THAT(bytes, Not(HasSubstr(word)));

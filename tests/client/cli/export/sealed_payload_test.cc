@@ -111,21 +111,21 @@ TEST(SealedPayloadTest, SaltAndNonceAreNewEveryTime) {
   EXPECT_NE(first.payload, second.payload);
 }
 
-TEST(SealedPayloadTest, MoreThanAPageTakesIsRefused) {
+TEST(SealedPayloadTest, RefusesAPayloadTooLargeForAPage) {
   EXPECT_THAT(SealPayload(std::string(kMaxMovingDataBytes + 1, 'x'), ""),
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("fewer triangles")));
 }
 
 class PasswordFileTest : public CliTest {};
 
-TEST_F(PasswordFileTest, ItsLineIsThePasswordHoweverItEnds) {
+TEST_F(PasswordFileTest, AcceptsAnyLineEnding) {
   for (const char* end : {"", "\n", "\r\n"}) {
     Write("password", std::string(kPassword) + end);
     EXPECT_EQ(ReadPasswordFile(Path("password")).value_or(""), kPassword);
   }
 }
 
-TEST_F(PasswordFileTest, WhatIsNoPasswordIsRefusedWithoutALetterOfIt) {
+TEST_F(PasswordFileTest, RefusesAnInvalidPasswordWithoutQuotingIt) {
   const std::string bad[] = {"", "secret!", "secret words\nmore", "secret \xff words",
                              std::string(kMaxPasswordBytes + 1, 's')};
   for (const std::string& text : bad) {

@@ -69,7 +69,7 @@ TEST_F(MeshCheckTest, TetsThatAreAllNegativeAreUsableAndReported) {
   EXPECT_EQ(json["defects"][0]["severity"], "warning");
 }
 
-TEST_F(MeshCheckTest, FacesBesideTheTetsAreLeftOutAndReported) {
+TEST_F(MeshCheckTest, OmitsAndReportsCellsThatAreNotTets) {
   const std::string mixed = TestDataPath("meshes/mixed_cells/meshio.vtk");
   const ProcessResult result = Run({"mesh", "check", mixed, "--json"});
   EXPECT_THAT(result, Succeeds());
@@ -139,7 +139,7 @@ TEST_F(MeshCheckTest, AMeshThatIsProbablyNotInMillimetersIsUsableWithAWarning) {
               HasSubstr("check the unit"));
 }
 
-TEST_F(MeshCheckTest, ASurfaceSaysInWhichSpaceItsFileStatesToBe) {
+TEST_F(MeshCheckTest, ReportsTheSpaceThatASurfaceFileStates) {
   const std::string facets =
       "\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 30 0 0\nvertex 0 40 0\nendloop\n"
       "endfacet\nendsolid\n";

@@ -147,7 +147,7 @@ TEST_F(MeshGenerateTest, OpenBoxIsRefusedAndAnOldMeshStays) {
   EXPECT_THAT(Files(), ElementsAre("box.vtu", "why.vtp"));
 }
 
-TEST_F(MeshGenerateTest, WrapsWhatIsRefusedOtherwise) {
+TEST_F(MeshGenerateTest, WrapsASurfaceThatIsOtherwiseRefused) {
   Write("two.off", TwoCubes(1.3));
   EXPECT_THAT(Run({"mesh", "generate", "two.off", "--out", "a.vtu"}),
               FailsWith(1, HasSubstr("wrap it (`--wrap-mm`)")));
@@ -163,7 +163,7 @@ TEST_F(MeshGenerateTest, WrapsWhatIsRefusedOtherwise) {
               FailsWith(1, HasSubstr("use an offset of")));
 }
 
-TEST_F(MeshGenerateTest, NamesNoWrapThatWouldNotHelp) {
+TEST_F(MeshGenerateTest, DoesNotSuggestAWrapThatWouldNotHelp) {
   Write("half.off", "OFF\n4 2 0\n0 0 0\n9 0 0\n0 9 0\n0 0 9\n3 0 1 2\n3 0 1 3\n");
   EXPECT_THAT(Run({"mesh", "generate", "half.off", "--out", "a.vtu"}),
               FailsWith(1, ::testing::Not(HasSubstr("--wrap-mm"))));

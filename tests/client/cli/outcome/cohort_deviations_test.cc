@@ -69,7 +69,7 @@ class CohortDeviationsTest : public CliTest {
   std::mt19937 random_{7};
 };
 
-TEST_F(CohortDeviationsTest, RecoversWhatPatientsWereDrawnFrom) {
+TEST_F(CohortDeviationsTest, RecoversTheDistributionOfThePatients) {
   AddPatients(2000, "bsso", 1);
   AddPatients(2000, "bimax", 2);
   const DeviationTable table = Written();

@@ -77,7 +77,7 @@ class OperatedCtTest : public ::testing::Test {
   PostOperativeHead post_;
 };
 
-TEST_F(OperatedCtTest, PlatesWithTheirStreaksDoNoHarm) {
+TEST_F(OperatedCtTest, ToleratesMetalPlatesAndTheirStreaks) {
   CtSimulation simulation;
   for (const Eigen::Vector3d& place :
        {Eigen::Vector3d(-75, 64, -112), Eigen::Vector3d(-118, 64, -112)}) {
@@ -89,7 +89,7 @@ TEST_F(OperatedCtTest, PlatesWithTheirStreaksDoNoHarm) {
   ExpectErrorsByRegion(outcome, TrueSkin());
 }
 
-TEST_F(OperatedCtTest, GrayValuesOfAConeBeamCtServeAsWell) {
+TEST_F(OperatedCtTest, AcceptsGrayValuesOfAConeBeamCt) {
   const CtVolume helical = ScanOf(post_, {}, kThreads);
   ConeBeam beam;
   beam.radius_mm = 95;

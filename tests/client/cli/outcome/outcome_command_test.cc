@@ -68,7 +68,7 @@ TEST_F(OutcomeCommandTest, WritesAReportOfAnOperatedHead) {
                           Not(HasSubstr("skin.stl")), Not(HasSubstr("<img"))));
 }
 
-TEST_F(OutcomeCommandTest, ACaseServesAsWellAsItsPlan) {
+TEST_F(OutcomeCommandTest, AcceptsACaseInPlaceOfItsPlan) {
   WriteOperatedHead();
   ASSERT_EQ(Run({"case", "pack", plan_, "--out", "head.tfcase"}).exit_code, 0);
   const ProcessResult by_case = Outcome({"--pre", "head.tfcase", "--post", "skin.stl"});

@@ -109,7 +109,7 @@ TEST_F(PlanBuildTest, ZipOfACtGivesThePlanOfTheCt) {
   }
 }
 
-TEST_F(PlanBuildTest, ZipOfTwoVolumesIsAQuestionThatNamesNobody) {
+TEST_F(PlanBuildTest, RefusesAZipOfTwoVolumesWithoutNamingThePatient) {
   WriteNamedCt();
   std::filesystem::create_directory(folder_ / "Doe");
   std::filesystem::copy(folder_ / "Doe_Jane.nhdr", folder_ / "Doe/other.nhdr");

@@ -47,7 +47,7 @@ class DeformTest : public CliTest {
   }
 };
 
-TEST_F(DeformTest, BarMeshOfThePlanIsWhatItsToolMakes) {
+TEST_F(DeformTest, BarMeshOfThePlanMatchesItsGenerator) {
   ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(TestDataPath("plans/bar/bar.vtu")));
   const TetMeshFile made = BarMeshOfPlan();
   EXPECT_EQ(file.mesh.positions(), made.mesh.positions());
@@ -57,7 +57,7 @@ TEST_F(DeformTest, BarMeshOfThePlanIsWhatItsToolMakes) {
   EXPECT_TRUE(file.cell_data.at(1).values == made.cell_data.at(1).values);
 }
 
-TEST_F(DeformTest, BlockMeshOfThePlanIsWhatItsToolMakes) {
+TEST_F(DeformTest, BlockMeshOfThePlanMatchesItsGenerator) {
   ASSERT_OK_AND_ASSIGN(const TetMeshFile file, ReadTetMesh(TestDataPath("plans/block/block.vtu")));
   const TetMeshFile made = BlockMeshOfPlan();
   EXPECT_EQ(file.mesh.positions(), made.mesh.positions());
@@ -130,7 +130,7 @@ TEST_F(DeformTest, RangesOfThePlanGiveElasticResultsABand) {
   }
 }
 
-TEST_F(DeformTest, CompareCountsWhatLiesWithinTheBand) {
+TEST_F(DeformTest, CompareCountsVerticesWithinTheBand) {
   nlohmann::json plan = BarPlan();
   plan["version"] = 2;
   plan["mesh"] = TestDataPath("plans/bar/bar.vtu");
@@ -359,7 +359,7 @@ TEST_F(DeformTest, OneSolverThreadIsTheDefaultToTheByteAndTwoAgree) {
   EXPECT_LT((one.mesh.positions() - two.mesh.positions()).cwiseAbs().maxCoeff(), 1e-9);
 }
 
-TEST_F(DeformTest, PlanCheckSaysWhatIsAskedFor) {
+TEST_F(DeformTest, PlanCheckSummarizesThePlannedMovement) {
   const ProcessResult result = Run({"plan", "check", TestDataPath("plans/bar/plan.json")});
   EXPECT_THAT(result, Succeeds());
   EXPECT_THAT(result.out, HasSubstr("top: 25 vertices, moves 6 mm, turns 45 degrees"));
@@ -440,7 +440,7 @@ TEST_F(DeformTest, WithContactOffTheResultArrayHasNoContacts) {
   EXPECT_EQ(std::ranges::count(off, 0.0), static_cast<ptrdiff_t>(off.size()));
 }
 
-TEST_F(DeformTest, TheWholeBandNamesItsPartsAndTakesAClinicsFigures) {
+TEST_F(DeformTest, FullBandNamesItsPartsAndUsesAClinicsDeviations) {
   const std::string plan = TestDataPath("plans/head_chin/plan.json");
   const auto place_of = [&](const std::vector<std::string>& more, const std::string& name) {
     std::vector<std::string> args = {"deform",         plan,      "--out", "a.vtu", "--model",
@@ -496,7 +496,7 @@ TEST_F(DeformTest, TheWholeBandNamesItsPartsAndTakesAClinicsFigures) {
   EXPECT_NE(FindAttribute(result.point_data, "total_uncertainty_p95_mm"), nullptr);
 }
 
-TEST_F(DeformTest, DeviationsThatAreNoneAreRefusedInOneLine) {
+TEST_F(DeformTest, RefusesInvalidDeviationsInOneLine) {
   const std::string plan = TestDataPath("plans/head_chin/plan.json");
   const std::vector<std::pair<std::string, std::string>> wrong = {
       {"[]", "is not a JSON object"},

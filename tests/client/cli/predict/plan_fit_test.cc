@@ -73,7 +73,7 @@ class PlanFitTest : public CliTest {
   Json targets_;
 };
 
-TEST_F(PlanFitTest, DeformOfTheFittedPlanDoesWhatWasWanted) {
+TEST_F(PlanFitTest, DeformingTheFittedPlanReachesTheTarget) {
   constexpr Eigen::Index kVertex = 200;  // 8 layers up: at its layer's rim
   const TetMeshFile bar = *ReadTetMesh(Path("bar.vtu"));
   const Vector3d rest = bar.mesh.positions().row(kVertex);
@@ -125,7 +125,7 @@ TEST_F(PlanFitTest, ContradictoryTargetsAreBothReported) {
                                  HasSubstr("which contradict each other"))));
 }
 
-TEST_F(PlanFitTest, NothingIsReplacedUnasked) {
+TEST_F(PlanFitTest, DoesNotReplaceFilesWithoutOverwrite) {
   Write("fitted.json", "mine");
   EXPECT_THAT(Fit({"--out", "fitted.json"}), FailsWith(1, HasSubstr("--out fitted.json exists")));
   EXPECT_EQ(Read("fitted.json"), "mine");

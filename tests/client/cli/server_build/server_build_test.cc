@@ -178,7 +178,7 @@ int ServerBuildTest::ExitCodeAfterSignal(const std::vector<std::string>& words, 
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-TEST_F(ServerBuildTest, PlanOfADicomSeriesIsTheLocalOneAndNamesNobody) {
+TEST_F(ServerBuildTest, DicomPlanMatchesTheLocalOneAndNamesNoPatient) {
   ASSERT_EQ(std::system("/usr/bin/python3 -c 'import numpy, pydicom' 2>/dev/null"), 0)
       << "python3-pydicom is not installed";
   const std::string write = absl::StrCat(
@@ -194,14 +194,14 @@ TEST_F(ServerBuildTest, PlanOfADicomSeriesIsTheLocalOneAndNamesNobody) {
   EXPECT_THAT(Read("there/report.json"), Not(HasSubstr("lanted")));
 }
 
-TEST_F(ServerBuildTest, FilesThatTheRecipeNamesGoWithIt) {
+TEST_F(ServerBuildTest, SendsTheFilesThatTheRecipeNames) {
   fs::create_directory(folder_ / "planes");
   Write("planes/above.mrk.json", kPlane);
   Write("recipe.json", Recipe(kRawCt, R"({"file": "planes/above.mrk.json"})", kBssro));
   ExpectTheSamePlan(TestDataPath("ct/headsq/headsq_quarter.nhdr"));
 }
 
-TEST_F(ServerBuildTest, PlanOfSurfacesIsTheLocalOne) {
+TEST_F(ServerBuildTest, SurfacesPlanMatchesTheLocalOne) {
   ASSERT_THAT(Run(Words(TestDataPath("ct/headsq/headsq_quarter.nhdr"),
                         {"--out", "head", "--no-pictures", "--accept-defects"})),
               Succeeds());

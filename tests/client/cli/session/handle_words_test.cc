@@ -44,7 +44,7 @@ TEST(HandleWordsTest, MovesBetweenAxesHaveNoDirection) {
   EXPECT_EQ(WordsOfMove(3, 4, 0), "top 5 mm");
 }
 
-TEST(HandleWordsTest, TurnsAreInDegreesAndRestIsSaid) {
+TEST(HandleWordsTest, TurnsAreInDegreesAndRestIsStated) {
   HandlePose pose;
   EXPECT_EQ(WordsOf(pose), "top at rest");
   pose.rotation_vector = {0, 0, M_PI / 9};

@@ -35,7 +35,7 @@ class ServerConnectionTest : public ::testing::Test {
   const ScopedEnvironment configuration_{"XDG_CONFIG_HOME", folder_.c_str()};
 };
 
-TEST_F(ServerConnectionTest, TheTokenOfTheLoginIsTaken) {
+TEST_F(ServerConnectionTest, UsesTheTokenOfTheLogin) {
   EXPECT_EQ(ResolveConnection({.address = "localhost:1"}).token_file, token_);
   EXPECT_EQ(ResolveConnection({.address = "a.example:1", .options = {.tls = true}}).token_file,
             token_);
@@ -44,12 +44,12 @@ TEST_F(ServerConnectionTest, TheTokenOfTheLoginIsTaken) {
       "b");
 }
 
-TEST_F(ServerConnectionTest, ItGoesNowhereUnencrypted) {
+TEST_F(ServerConnectionTest, DoesNotSendTheLoginTokenUnencrypted) {
   EXPECT_EQ(ResolveConnection({.address = "a.example:1", .options = {.insecure = true}}).token_file,
             "");
 }
 
-TEST_F(ServerConnectionTest, WithoutOneThereIsNone) {
+TEST_F(ServerConnectionTest, HasNoTokenWithoutALogin) {
   std::filesystem::remove(token_);
   EXPECT_EQ(ResolveConnection({.address = "localhost:1"}).token_file, "");
 }

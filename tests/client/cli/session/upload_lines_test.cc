@@ -24,12 +24,12 @@ class UploadLinesTest : public ::testing::Test {
   const UploadOptions options_ = upload_.Options();
 };
 
-TEST_F(UploadLinesTest, AShortOneSaysNothing) {
+TEST_F(UploadLinesTest, ShortUploadPrintsNothing) {
   for (now_s_ = 0; now_s_ < 1; now_s_ += 0.1) options_.on_progress(100, 1000);
   EXPECT_THAT(lines_, IsEmpty());
 }
 
-TEST_F(UploadLinesTest, ALongOneSaysALineASecond) {
+TEST_F(UploadLinesTest, LongUploadPrintsALineASecond) {
   for (int step = 1; step <= 30; ++step) {
     now_s_ = step / 8.0;
     options_.on_progress(step * 100'000, 3'000'000);

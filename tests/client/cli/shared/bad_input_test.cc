@@ -159,7 +159,7 @@ TEST_F(BadInputTest, UnknownKeyAndWrongType) {
   EXPECT_THAT(DeformWith("/handles", "top"), IsRefused("wrong type at /handles"));
 }
 
-TEST_F(BadInputTest, NumbersThatAreNoneOrOutOfRange) {
+TEST_F(BadInputTest, NonFiniteOrOutOfRangeNumbers) {
   EXPECT_THAT(DeformText(R"({"poisson_ratio": NaN})"), IsRefused("not valid JSON"));
   EXPECT_THAT(DeformText(R"({"poisson_ratio": -Infinity})"), IsRefused("not valid JSON"));
   EXPECT_THAT(DeformWith("/handles/0/pose/scale", 0), IsRefused("/handles/0/pose/scale"));

@@ -19,7 +19,7 @@ PlanProblem BarProblem(DeformationModel model) {
   return problem;
 }
 
-TEST(ElasticResultsTest, ModelsWithoutStressesHaveNone) {
+TEST(ElasticResultsTest, NonElasticModelsHaveNoElasticResults) {
   for (const auto model : {DeformationModel::kGradientField, DeformationModel::kArap}) {
     const PlanProblem problem = BarProblem(model);
     EXPECT_FALSE(SummarizeElastic(problem, problem.mesh->positions()).has_value());
@@ -29,7 +29,7 @@ TEST(ElasticResultsTest, ModelsWithoutStressesHaveNone) {
   }
 }
 
-TEST(ElasticResultsTest, NothingIsBorneAtRest) {
+TEST(ElasticResultsTest, HasNoForcesOrStressesAtRest) {
   for (const auto model : {DeformationModel::kLinearElastic, DeformationModel::kNeoHookean}) {
     const PlanProblem problem = BarProblem(model);
     const auto summary = SummarizeElastic(problem, problem.mesh->positions());
@@ -42,7 +42,7 @@ TEST(ElasticResultsTest, NothingIsBorneAtRest) {
 }
 
 // A file of statistics stays a file of JSON.
-TEST(ElasticResultsTest, WhatAnInvertedTetLeavesWithoutAnAnswerIsNull) {
+TEST(ElasticResultsTest, ResultsUndefinedDueToAnInvertedTetAreNull) {
   const PlanProblem problem = BarProblem(DeformationModel::kNeoHookean);
   Positions folded = problem.mesh->positions();
   folded.row(160) += Eigen::RowVector3d(0, 0, 30);  // far beyond its neighbours

@@ -8,11 +8,11 @@
 namespace tissueform {
 namespace {
 
-TEST(StatsJsonTest, OfAnAnswerThatHasConvergedNothingWasNotReached) {
+TEST(StatsJsonTest, ConvergedAnswerHasNoNotReachedText) {
   EXPECT_EQ(NotReachedText({}), "");
 }
 
-TEST(StatsJsonTest, WhatWasNotReachedNamesTheObstacle) {
+TEST(StatsJsonTest, UnreachedMovementNamesTheObstacle) {
   SolveSummary solve;
   solve.converged = false;
   solve.load = 0.25;

@@ -154,14 +154,14 @@ TEST_F(CalculixTest, ForcesAndStressesAreDistinguishedAndStressesOfTissuesMerged
               HasSubstr("2 stresses for 3 tets"));
 }
 
-TEST_F(CalculixTest, MissingProgramIsSaidWithItsPackage) {
+TEST_F(CalculixTest, MissingProgramNamesItsPackage) {
   const ScopedEnvironment no_programs("PATH", "/nonexistent");
   const auto result = RunCalculix(StretchedBar(CalculixLaw::kLinear), folder_);
   EXPECT_TRUE(absl::IsNotFound(result.status()));
   EXPECT_THAT(result.status().message(), HasSubstr("install the package calculix-ccx"));
 }
 
-TEST_F(CalculixTest, FailureIsSaidWithTheProgramsLastWord) {
+TEST_F(CalculixTest, FailureQuotesTheLastLineOfTheProgram) {
   PutCcx("echo hello\necho ' *ERROR in e_c3d: nonpositive jacobian'\necho\nexit 201\n");
   const ScopedEnvironment programs("PATH", folder_.c_str());
   const auto result = RunCalculix(StretchedBar(CalculixLaw::kLinear), folder_);
@@ -169,7 +169,7 @@ TEST_F(CalculixTest, FailureIsSaidWithTheProgramsLastWord) {
   EXPECT_THAT(result.status().message(), HasSubstr("*ERROR in e_c3d: nonpositive jacobian"));
 }
 
-TEST_F(CalculixTest, AnswersOfAFormerRunAreNotTaken) {
+TEST_F(CalculixTest, IgnoresResultsOfAnEarlierRun) {
   ASSERT_THAT(RunCalculix(StretchedBar(CalculixLaw::kLinear), folder_), IsOk());
   PutCcx("exit 0\n");
   const ScopedEnvironment programs("PATH", folder_.c_str());

@@ -40,7 +40,7 @@ TEST_F(ExperimentsTest, UnknownNameIsWrongUseAndLeavesNothing) {
   EXPECT_THAT(Files(), ElementsAre());
 }
 
-TEST_F(ExperimentsTest, FolderThatCannotBeMadeIsSaidInOneLine) {
+TEST_F(ExperimentsTest, ReportsAnUnusableFolderInOneLine) {
   Write("taken", "");
   EXPECT_THAT(Run({"experiments", "--out", "taken/figures"}),
               FailsWith(1, HasSubstr("taken/figures")));
@@ -48,7 +48,7 @@ TEST_F(ExperimentsTest, FolderThatCannotBeMadeIsSaidInOneLine) {
   EXPECT_THAT(Files(), ElementsAre("taken"));
 }
 
-TEST_F(ExperimentsTest, MissingXvfbIsSaidInOneLine) {
+TEST_F(ExperimentsTest, ReportsMissingXvfbInOneLine) {
   const ScopedEnvironment no_display("DISPLAY", nullptr);
   const ScopedEnvironment no_programs("PATH", "/nonexistent");
   EXPECT_THAT(Run({"experiments", "--out", "figures", "--only", "fig1"}),
@@ -61,7 +61,7 @@ TEST_F(ExperimentsTest, NamesMayBeGivenWithoutTheirOption) {
   EXPECT_THAT(help.out, HasSubstr("accuracy"));
 }
 
-TEST_F(ExperimentsTest, CasesOfTheAccuracyAreNamedAndNoOthersAreTaken) {
+TEST_F(ExperimentsTest, RefusesAnUnknownAccuracyCaseAndListsTheKnownOnes) {
   EXPECT_THAT(
       Run({"experiments", "accuracy", "--case", "jelly", "--out", "accuracy"}),
       FailsWith(2, AllOf(HasSubstr("jelly"), HasSubstr("head_mandible"), HasSubstr("locking"))));

@@ -68,7 +68,7 @@ class AccessAuditTest : public ::testing::Test {
   std::optional<AccessAudit> access_;
 };
 
-TEST_F(AccessAuditTest, RefusalsSayFromWhereAndWhy) {
+TEST_F(AccessAuditTest, RefusalsStateTheSourceAndTheReason) {
   Start();
   access_->ConnectionRefused(
       {.address = "192.0.2.9", .calling_ae = "EVIL", .reason = "unknown calling AE title"});
@@ -79,7 +79,7 @@ TEST_F(AccessAuditTest, RefusalsSayFromWhereAndWhy) {
                                     "110114 8 eve 192.0.2.7 wrong password of the review page"));
 }
 
-TEST_F(AccessAuditTest, AFloodIsAFewEventsAndTheirNumber) {
+TEST_F(AccessAuditTest, SummarizesAFloodInAFewEventsAndACount) {
   Start({.limit = {.max_per_source = 3}});
   for (int i = 0; i < 1000; ++i) {
     access_->ConnectionRefused({.address = "192.0.2.9", .reason = "unknown address"});
@@ -93,7 +93,7 @@ TEST_F(AccessAuditTest, AFloodIsAFewEventsAndTheirNumber) {
   EXPECT_THAT(events.back(), HasSubstr("1994 more refusals"));
 }
 
-TEST_F(AccessAuditTest, TheNumberComesAtTheEndOfThePeriodByItself) {
+TEST_F(AccessAuditTest, ReportsTheCountWhenThePeriodEnds) {
   Start({.limit = {.max_per_source = 1, .period = std::chrono::milliseconds(50)}});
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!absl::StrContains(absl::StrJoin(Messages(), ""), "more refusals")) {

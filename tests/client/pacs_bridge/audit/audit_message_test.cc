@@ -67,7 +67,7 @@ TEST(AuditMessage, EveryKindFollowsTheSchema) {
   }
 }
 
-TEST(AuditMessage, WhatIsMissingIsLeftOut) {
+TEST(AuditMessage, OmitsMissingValues) {
   AuditEvent event = TransferEvent();
   event.study = AuditedStudy{.study_uid = "1.2.3"};
   const std::string message = ToAuditMessage(event);
@@ -100,7 +100,7 @@ TEST(AuditMessage, TextsFromOutsideStayTexts) {
 }
 
 // The schema is ours to write down: it must be able to refuse.
-TEST(AuditMessage, TheSchemaRefusesWhatIsWrong) {
+TEST(AuditMessage, SchemaRefusesInvalidMessages) {
   const std::string right = ToAuditMessage(TransferEvent());
   for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
            {"EventActionCode=\"C\"", "EventActionCode=\"X\""},

@@ -197,7 +197,7 @@ TEST_F(AuditedPacsClientTest, ARefusalIsASecurityAlert) {
   EXPECT_THAT(Events(), ElementsAre("110112 8 ", "110113 8 ", "110104 8 ", "110113 8 "));
 }
 
-TEST_F(AuditedPacsClientTest, WhileTheAuditTakesNothingThePacsIsNotAsked) {
+TEST_F(AuditedPacsClientTest, DoesNotCallThePacsWhileTheAuditLogIsBlocked) {
   ASSERT_TRUE(audit_->Flush());
   record_.Limit(0);
   EXPECT_THAT(pacs_->FindPatient("1.2"), IsOk()) << "the last one that nobody could know of";

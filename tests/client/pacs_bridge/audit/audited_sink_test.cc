@@ -115,7 +115,7 @@ TEST_F(AuditedSinkTest, RefusalIsASeparateEvent) {
                                                "110104 8 1.2,A 1"));
 }
 
-TEST_F(AuditedSinkTest, WhileTheAuditTakesNothingNothingIsReceived) {
+TEST_F(AuditedSinkTest, ReceivesNothingWhileTheAuditLogIsBlocked) {
   ASSERT_TRUE(audit_->Flush());
   record_.Limit(0);
   EXPECT_THAT(Keep(1, "1.2", "A"), IsOk()) << "the last one that nobody could know of";

@@ -35,7 +35,7 @@ TEST(EventLimitTest, APeriodBeginsWithTheFirstEventAfterTheLast) {
   EXPECT_EQ(limit.period_end(), kStart + seconds(135));
 }
 
-TEST(EventLimitTest, WhatIsDroppedIsTakenOnce) {
+TEST(EventLimitTest, ReportsTheDroppedCountOnce) {
   EventLimit limit({.max_per_source = 1});
   Admitted(&limit, "a", kStart, 5);
   EXPECT_EQ(limit.TakeDropped(), 4);

@@ -196,7 +196,7 @@ TEST(CharacterSetsTest, AnotherReaderReadsTheSame) {
   }
 }
 
-TEST(CharacterSetsTest, ADelimiterWithinACharacterIsNone) {
+TEST(CharacterSetsTest, IgnoresADelimiterByteWithinACharacter) {
   EXPECT_THAT(CharacterSet("\\ISO 2022 IR 87").ToUtf8("\x1B$B0\\0^0=\x1B(B^a", true),
               Optional(std::string("移緯綾^a")));
   EXPECT_THAT(CharacterSet("GBK").ToUtf8("\x81\\", true), Optional(std::string("乗")));
@@ -217,7 +217,7 @@ TEST(CharacterSetsTest, MisspelledNamesAreKnown) {
   }
 }
 
-TEST(CharacterSetsTest, WhatIsOfNoNamedSetIsNotGuessed) {
+TEST(CharacterSetsTest, DoesNotGuessTextOutsideTheNamedSets) {
   const auto nothing = [](const char* names, absl::string_view raw) {
     EXPECT_EQ(CharacterSet(names).ToUtf8(raw, true), std::nullopt) << names;
   };

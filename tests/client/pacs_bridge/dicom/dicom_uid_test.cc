@@ -11,7 +11,7 @@
 namespace tissueform {
 namespace {
 
-TEST(DicomUid, NewOnesAreUidsOfTheirOwn) {
+TEST(DicomUid, NewUidsAreValidAndUnique) {
   std::set<std::string> uids;
   for (int i = 0; i < 1000; ++i) {
     const std::string uid = NewDicomUid();

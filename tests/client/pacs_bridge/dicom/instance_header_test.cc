@@ -29,7 +29,7 @@ InstanceHeader HeaderOf(const std::string& name, const CtSeriesOptions& options)
   return header.value_or(InstanceHeader{});
 }
 
-TEST(InstanceHeader, SaysWhatTheSliceSays) {
+TEST(InstanceHeader, ReadsTheAttributesOfASlice) {
   CtSeriesOptions options;
   options.slices = 3;
   options.axes << 0, 0, 1, 1, 0, 0, 0, -1, 0;  // sagittal
@@ -90,7 +90,7 @@ TEST(InstanceHeader, NameOfAHundredThousandCharactersIsCutAndReported) {
   }
 }
 
-TEST(InstanceHeader, AUidThatIsNoneIsRefusedWithoutRepeatingIt) {
+TEST(InstanceHeader, RefusesAnInvalidUidWithoutRepeatingIt) {
   CtSeriesOptions options;
   options.slices = 1;
   options.study_uid = "../../etc/planted";

@@ -49,7 +49,7 @@ TEST(StatusOfStow, IsOkWhereItIsStoredWithWarnings) {
   EXPECT_THAT(StatusOf(Answer("", warned), 202), IsOk());
 }
 
-TEST(StatusOfStow, IsARefusalWhereTheObjectIsListedAsFailedBesideAnEmptyList) {
+TEST(StatusOfStow, IsARefusalIfTheObjectIsListedAsFailed) {
   for (const int http_status : {200, 202, 409}) {
     EXPECT_THAT(StatusOf(Answer(Sequence(kUid, 0x0122), kEmpty), http_status),
                 StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("0x0122")));
@@ -63,7 +63,7 @@ TEST(StatusOfStow, IsOkForADuplicate) {
   EXPECT_THAT(StatusOf(Answer(Sequence(kUid, 0x0111), kEmpty), 200), IsOk());
 }
 
-TEST(StatusOfStow, ComesAgainWhereThereIsNoRoom) {
+TEST(StatusOfStow, IsRetryableIfThePacsHasNoRoom) {
   for (const int reason : {0xA700, 0xA7FF}) {
     EXPECT_THAT(StatusOf(Answer(Sequence(kUid, reason), kEmpty), 409),
                 StatusIs(absl::StatusCode::kUnavailable, HasSubstr("no room")));
@@ -72,7 +72,7 @@ TEST(StatusOfStow, ComesAgainWhereThereIsNoRoom) {
               StatusIs(absl::StatusCode::kFailedPrecondition));
 }
 
-TEST(StatusOfStow, ComesAgainWhereNothingIsSaidOfTheObject) {
+TEST(StatusOfStow, IsRetryableIfTheObjectIsNotMentioned) {
   for (const std::string& text :
        {Answer(kEmpty, kEmpty), Answer("", ""), Answer("", Sequence("2.25.1")), std::string(kUid),
         std::string(), std::string(R"({"00081199":"2.25.4711"})")}) {

@@ -256,7 +256,7 @@ TEST_P(PacsHeaderTest, AHeaderComesWithoutPixels) {
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("no such series")));
 }
 
-TEST_P(PacsHeaderTest, OfASeriesWithCapturesTheHeaderOfASliceComes) {
+TEST_P(PacsHeaderTest, FetchesTheHeaderOfASliceFromASeriesWithCaptures) {
   CtSeriesOptions options{.study_uid = NewDicomUid(), .series_uid = NewDicomUid()};
   options.slices = 1;
   const CtSeries slice = WriteCtSeries(home_ / "sent", options);
@@ -271,7 +271,7 @@ TEST_P(PacsHeaderTest, OfASeriesWithCapturesTheHeaderOfASliceComes) {
   EXPECT_EQ(ReadInstanceHeader(home_ / "header")->class_uid, kCtImageClass);
 }
 
-TEST_P(TlsPacsClientTest, WithoutACertificateOfTheAuthorityNobodyIsServed) {
+TEST_P(TlsPacsClientTest, RequiresTrustedCertificatesOnBothSides) {
   const TestAuthority stranger("Another authority");
   TestFiles foreign = stranger.IssueFiles(home_ / "keys", "foreign");
   peer_.tls = TlsFiles{foreign.certificate, foreign.key, files_->roots};
@@ -303,7 +303,7 @@ TEST_P(WebPacsClientTest, ObjectThatTheDiskRefusesIsNotStored) {
   EXPECT_THAT((*again)[0].status, IsOk()) << "it has it already";
 }
 
-TEST_P(PacsClientTest, APacsThatHasGoneIsUnavailable) {
+TEST_P(PacsClientTest, ReportsAStoppedPacsAsUnavailable) {
   haproxy_.reset();
   orthanc_.reset();
   EXPECT_THAT(client_->FindPatient(NewDicomUid()).status(),

@@ -87,7 +87,7 @@ TEST_F(StorageAssociationTest, Jpeg2000IsKeptAsItIs) {
 class BrokenTransferTest : public StorageAssociationTest,
                            public ::testing::WithParamInterface<WireEnd> {};
 
-TEST_P(BrokenTransferTest, LeavesWhatCameBeforeAndNothingHalf) {
+TEST_P(BrokenTransferTest, KeepsCompleteInstancesAndNoPartialOnes) {
   CtSeriesOptions large;
   large.slices = 3;
   large.rows = 512;

@@ -102,7 +102,7 @@ TEST(ConformanceStatement, NamesEveryStorageClassThatIsTaken) {
   }
 }
 
-TEST_F(StorageReceiverTest, ASeriesComesToTheLastBitUnderNamesThatSayNothing) {
+TEST_F(StorageReceiverTest, StoresASeriesBitIdenticallyUnderNeutralNames) {
   Start();
   CtSeriesOptions options;
   options.private_text = std::string(20'000, 'x');
@@ -233,7 +233,7 @@ TEST_F(StorageReceiverTest, MixedPatientsInOneAssociationAreReportedSeparately) 
   EXPECT_THAT(associations, SizeIs(1));
 }
 
-TEST_F(StorageReceiverTest, AnAssociationThatIsAbortedLeavesWhatCameBefore) {
+TEST_F(StorageReceiverTest, AbortedAssociationKeepsTheReceivedInstances) {
   Start();
   const CtSeries series = WriteCtSeries(sent_);
   Send(series.files, {"--abort"});
@@ -282,7 +282,7 @@ TEST_F(StorageReceiverTest, SilentConnectionsDoNotBlockOthers) {
   EXPECT_EQ(Send(WriteCtSeries(sent_, {.slices = 1}).files).exit_code, 0);
 }
 
-TEST_F(StorageReceiverTest, SilenceEndsAConnection) {
+TEST_F(StorageReceiverTest, ClosesASilentConnection) {
   options_.connect_time = std::chrono::seconds(1);
   Start();
   Silent one(receiver_->port());
@@ -338,7 +338,7 @@ TEST_F(StorageReceiverTest, BeyondTheLimitAnAssociationIsRefusedForNow) {
               ElementsAre("127.0.0.1 SCANNER: too many associations are open"));
 }
 
-TEST_F(StorageReceiverTest, StoppingBreaksOffWhatIsOpen) {
+TEST_F(StorageReceiverTest, StoppingClosesOpenConnections) {
   Start();
   Silent one(receiver_->port());
   ASSERT_TRUE(one.connected());

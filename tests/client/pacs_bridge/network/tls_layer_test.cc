@@ -97,7 +97,7 @@ TEST_F(TlsReceiverTest, PlainAnonymousExpiredAndForeignPeersAreRefused) {
   EXPECT_EQ(Send(As(good)).exit_code, 0);
 }
 
-TEST(TlsLayer, FilesThatDoNotFitAreNamed) {
+TEST(TlsLayer, NamesMismatchedFiles) {
   const TestAuthority authority;
   const fs::path keys = EmptyTestFolder("tls_layer_files");
   const TlsFiles good = FilesOf(authority.IssueFiles(keys, "good"));

@@ -60,7 +60,7 @@ TEST(ModelIcon, ThePatientsLeftIsOnTheRightAndTheTopAbove) {
   EXPECT_GT(count(0, kSide / 2), count(kSide / 2, 0));
 }
 
-TEST(ModelIcon, NothingIsBlack) {
+TEST(ModelIcon, EmptyModelGivesABlackIcon) {
   const auto icon = DrawModelIcon(FloatPositions(0, 3), TriangleIndices(0, 3), {});
   EXPECT_EQ(*std::max_element(icon.begin(), icon.end()), 0);
 }

@@ -76,7 +76,7 @@ TEST_F(OtherReadersTest, DciodvfyFindsNoErrorWhereTheScannerSaysLittle) {
   }
 }
 
-TEST_F(OtherReadersTest, PydicomFindsWhatTheTableSays) {
+TEST_F(OtherReadersTest, PydicomFindsTheDocumentedAttributes) {
   ASSERT_TRUE(HasModule("pydicom")) << "python3-pydicom is not installed";
   CtSeriesOptions options;
   options.character_set = "ISO_IR 192";
@@ -167,7 +167,7 @@ TEST_F(OtherReadersTest, DcmtkReadsTheReport) {
   EXPECT_THAT(Said(), HasSubstr("<value>6.3246</value>"));
 }
 
-TEST_F(OtherReadersTest, TheReportSaysWhatAnIntervalHolds) {
+TEST_F(OtherReadersTest, ReportStatesWhatAnIntervalCovers) {
   ASSERT_TRUE(Has("dsrdump")) << "dcmtk is not installed";
   PredictionObjectsInput input = MakeInput();
   ASSERT_EQ(Run("dsrdump +Pl " + Write(input).at("report").path), 0) << Said();

@@ -111,7 +111,7 @@ class PlacesTest : public ObjectsFixture, public ::testing::WithParamInterface<S
   }
 };
 
-TEST_P(PlacesTest, AMarkerOfTheCtLiesInTheModelWhereItLay) {
+TEST_P(PlacesTest, MarkerOfTheCtKeepsItsPlaceInTheModel) {
   CtSeriesOptions options;
   options.rows = 64;
   options.columns = 64;

@@ -83,7 +83,7 @@ TEST_F(PredictionObjectsTest, EveryKeyIsWrittenOnceWithItsUids) {
   EXPECT_EQ(series.size(), 3U);
 }
 
-TEST_F(PredictionObjectsTest, FilesAreTheirOwnersAlone) {
+TEST_F(PredictionObjectsTest, FilesAreAccessibleOnlyToTheirOwner) {
   for (const WrittenObject& object : WriteAll(MakeInput())) {
     EXPECT_EQ(std::filesystem::status(object.path).permissions(),
               std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
@@ -99,7 +99,7 @@ TEST_F(PredictionObjectsTest, TheSameInputGivesTheSameBytes) {
     EXPECT_EQ(BytesOfFile(object.path), first[key]) << key;
 }
 
-TEST_F(PredictionObjectsTest, ModelsSayWhatTheyAre) {
+TEST_F(PredictionObjectsTest, ModelsCarryDescriptiveAttributes) {
   const PredictionObjectsInput input = MakeInput();
   const auto objects = Write(input);
   for (const auto& [key, object] : objects) {
@@ -208,7 +208,7 @@ INSTANTIATE_TEST_SUITE_P(
                                   "Yamada^Tarou=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B"}),
     [](const auto& patient) { return std::string(patient.param.word); });
 
-TEST_F(PredictionObjectsTest, WhatEveryoneElseMayReadNamesNoPatient) {
+TEST_F(PredictionObjectsTest, PathsAndContentsLeakNoPrivatePatientData) {
   CtSeriesOptions options;
   options.private_text = std::string(40'000, 'x') + "Planted^Private";
   for (const WrittenObject& object : WriteAll(MakeInput(options))) {

@@ -54,13 +54,13 @@ class BridgeQueueTest : public ::testing::Test {
   std::unique_ptr<BridgeQueue> queue_;
 };
 
-TEST_F(BridgeQueueTest, IsItsOwnersAlone) {
+TEST_F(BridgeQueueTest, IsAccessibleOnlyToItsOwner) {
   const auto others = fs::perms::group_all | fs::perms::others_all;
   EXPECT_EQ(fs::status(folder_).permissions() & others, fs::perms::none);
   EXPECT_EQ(fs::status(folder_ + "/queue.db").permissions() & others, fs::perms::none);
 }
 
-TEST_F(BridgeQueueTest, IsHeldByOneProcessAndReadBesideIt) {
+TEST_F(BridgeQueueTest, IsHeldByOneProcessAndReadableByOthers) {
   EXPECT_THAT(BridgeQueue::Open(folder_).status(), StatusIs(absl::StatusCode::kUnavailable));
   const auto reader = BridgeQueue::OpenForReading(folder_);
   ASSERT_THAT(reader, IsOk());
@@ -70,7 +70,7 @@ TEST_F(BridgeQueueTest, IsHeldByOneProcessAndReadBesideIt) {
   EXPECT_EQ(ReceivedRows(reader->get()).List()->size(), 1);
 }
 
-TEST_F(BridgeQueueTest, OfANewerProgramIsLeftAlone) {
+TEST_F(BridgeQueueTest, RefusesAQueueOfANewerProgram) {
   ASSERT_THAT(
       queue_->Change([](Database& database) { return database.Execute("PRAGMA user_version=2"); }),
       IsOk());
@@ -89,7 +89,7 @@ TEST_F(BridgeQueueTest, KeepsAllOfAChangeOrNothing) {
   EXPECT_TRUE(ReceivedRows(queue_.get()).ListImages("k")->empty());
 }
 
-TEST_F(BridgeQueueTest, HasAnImageThatComesAgainOnce) {
+TEST_F(BridgeQueueTest, KeepsARepeatedImageOnce) {
   ReceivedRows rows(queue_.get());
   const std::vector<QueuedImage> images = {{.uid = "1", .class_uid = "c", .file = "f1"},
                                            {.uid = "2", .class_uid = "c", .file = "f2"}};
@@ -113,7 +113,7 @@ TEST_F(BridgeQueueTest, GoesOnWithASeriesThatHadStopped) {
             SeriesState::kReceiving);
 }
 
-TEST_F(BridgeQueueTest, DecidesAnewOnlyOfWhatNoPlanIsBuilt) {
+TEST_F(BridgeQueueTest, NewImageReopensOnlyASeriesWithoutABuiltPlan) {
   ReceivedRows rows(queue_.get());
   int image = 0;
   for (const auto& [state, after] : std::vector<std::pair<SeriesState, SeriesState>>{
@@ -180,7 +180,7 @@ TEST_F(BridgeQueueTest, RefusesASeriesOfTwoStudies) {
   EXPECT_THAT(rows.GetStudy("1.9").status(), StatusIs(absl::StatusCode::kNotFound));
 }
 
-TEST_F(BridgeQueueTest, TakesAPersonsWordOnceAndOnlyWhereItWaits) {
+TEST_F(BridgeQueueTest, AcceptsAConfirmationOnceAndOnlyForAWaitingExport) {
   ExportRows rows(queue_.get());
   EXPECT_THAT(rows.Confirm("exports/1", "d"), StatusIs(absl::StatusCode::kNotFound));
   ASSERT_THAT(rows.Add(Export()), IsOk());
@@ -189,7 +189,7 @@ TEST_F(BridgeQueueTest, TakesAPersonsWordOnceAndOnlyWhereItWaits) {
   EXPECT_THAT(rows.Confirm("exports/1", "e"), StatusIs(absl::StatusCode::kFailedPrecondition));
 }
 
-TEST_F(BridgeQueueTest, GivesAnObjectOneUidForGood) {
+TEST_F(BridgeQueueTest, GivesAnObjectOnePermanentUid) {
   ExportRows rows(queue_.get());
   ASSERT_THAT(rows.Add(Export()), IsOk());
   const auto first = rows.EnsureObjects("exports/1", {"stl:skin", "report"}, NewDicomUid);

@@ -105,7 +105,7 @@ class ReviewTest : public ::testing::Test {
   std::unique_ptr<ReviewServer> server_;
 };
 
-TEST_F(ReviewTest, ShowsWhoseItIsAndOpensThePlanner) {
+TEST_F(ReviewTest, ShowsThePatientAndLinksToThePlanner) {
   Start();
   const std::string page = Curl("");
   EXPECT_THAT(page, StartsWith("HTTP/1.1 200"));
@@ -153,7 +153,7 @@ TEST_F(ReviewTest, AFormFromElsewhereIsRefused) {
   EXPECT_EQ(State(), BridgeExportState::kAsked);
 }
 
-TEST_F(ReviewTest, APatientWhoChangedSinceThePageWasShownIsNotConfirmed) {
+TEST_F(ReviewTest, DoesNotConfirmAPatientChangedSinceThePageWasShown) {
   Start();
   const std::string page = Curl("");
   ExportRows rows(queue_.get());
@@ -224,7 +224,7 @@ TEST_F(ReviewTest, WithoutAPasswordItListensOnLoopbackOnly) {
               StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
-TEST_F(ReviewTest, APathLeadsNowhereElse) {
+TEST_F(ReviewTest, RefusesPathsOutsideThePictures) {
   Start();
   for (const char* path : {"/pictures/../../queue.db", "/pictures/a/front.png", "/queue.db"}) {
     EXPECT_THAT(Curl("--path-as-is", path), StartsWith("HTTP/1.1 404")) << path;

@@ -92,7 +92,7 @@ class BridgeCrashTest : public ::testing::Test {
   CtSeries series_;
 };
 
-TEST_F(BridgeCrashTest, EveryPlaceOfDeathLeavesOneOfEachObject) {
+TEST_F(BridgeCrashTest, CrashAtAnyPointLeavesOneOfEachObject) {
   Begin("bridge_crash_none");
   int points = 0;
   ASSERT_EQ(Run(0, &points).exit_code, 0);
@@ -107,7 +107,7 @@ TEST_F(BridgeCrashTest, EveryPlaceOfDeathLeavesOneOfEachObject) {
   }
 }
 
-TEST_F(BridgeCrashTest, DeathAfterDeathComesToTheEnd) {
+TEST_F(BridgeCrashTest, RepeatedCrashesStillReachTheEnd) {
   Begin("bridge_crash_often");
   ChildEnd end{.signal = SIGKILL};
   // A process that dies at its sixteenth place each time still comes on, step by step.

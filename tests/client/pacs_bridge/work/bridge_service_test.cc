@@ -125,7 +125,7 @@ class BridgeServiceTest : public BridgeWork {
   SlowWriter slow_{&log_};
 };
 
-TEST_F(BridgeServiceTest, AnExportThatIsDrawnHoldsUpNoOther) {
+TEST_F(BridgeServiceTest, DrawingOneExportDoesNotDelayOthers) {
   Confirm("exports/2");
   const auto service = Serve();
   EXPECT_TRUE(log_.WaitFor("draws"));
@@ -230,7 +230,7 @@ class OnceRefusingServer final : public FolderCaseServer {
 class RefusedWordTest : public BridgeServiceTest,
                         public ::testing::WithParamInterface<absl::StatusCode> {};
 
-TEST_P(RefusedWordTest, IsSaidAgainThoughTheWatchGoesOn) {
+TEST_P(RefusedWordTest, RefusedUpdateIsSentAgainDuringAWatch) {
   v1::Export reported;
   reported.set_name("exports/1");
   reported.set_case_(exports_.Get("exports/1")->case_name);

@@ -77,7 +77,7 @@ TEST_F(DraftWorkTest, EachCaseOfADraftIsOneOfItsSeries) {
   EXPECT_THAT(*drafts_.List(), IsEmpty());
 }
 
-TEST_F(DraftWorkTest, ImagesThatComeLateAreNoneOfTheDraft) {
+TEST_F(DraftWorkTest, LateImagesAreNotPartOfTheDraft) {
   const QueuedSeries series = WaitingDraft();
   const int64_t images = series.images;
   Receive("more",
@@ -90,7 +90,7 @@ TEST_F(DraftWorkTest, ImagesThatComeLateAreNoneOfTheDraft) {
   EXPECT_THAT(*rows_.ListSources("cases/1"), SizeIs(images));
 }
 
-TEST_F(DraftWorkTest, ADraftThatIsGoneIsSaidToBeGone) {
+TEST_F(DraftWorkTest, ReportsALostDraft) {
   const QueuedSeries series = WaitingDraft();
   server_->away = absl::UnavailableError("the server is away");
   EXPECT_THAT(plans_.FollowDrafts(), StatusIs(absl::StatusCode::kUnavailable));
@@ -102,7 +102,7 @@ TEST_F(DraftWorkTest, ADraftThatIsGoneIsSaidToBeGone) {
   EXPECT_THAT(Now().last_error, HasSubstr("tissueform-pacs draft"));
 }
 
-TEST_F(DraftWorkTest, APlanThatWasBuiltOtherwiseStaysTheOneThatIsShown) {
+TEST_F(DraftWorkTest, CaseOfADraftDoesNotReplaceAPlanBuiltOtherwise) {
   WaitingDraft();
   MakeCase(received_);
   const std::string built = Now().case_name;

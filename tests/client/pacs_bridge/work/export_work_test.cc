@@ -41,7 +41,7 @@ class ExportWorkTest : public BridgeWork {
   }
 };
 
-TEST_F(ExportWorkTest, AnExportGoesToThePacsAfterAPersonsWord) {
+TEST_F(ExportWorkTest, StoresAnExportOnlyAfterConfirmation) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   EXPECT_THAT(Work("exports/1"), IsOk());
@@ -66,7 +66,7 @@ TEST_F(ExportWorkTest, MissingBandIsReportedAndTheReportOmitsIt) {
                              HasSubstr("without a band of uncertainty: ranges: 3 tets of 16")));
 }
 
-TEST_F(ExportWorkTest, ABandThatIsNotKnownIsNoReasonToWarn) {
+TEST_F(ExportWorkTest, UnknownBandCausesNoWarning) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -74,7 +74,7 @@ TEST_F(ExportWorkTest, ABandThatIsNotKnownIsNoReasonToWarn) {
   EXPECT_TRUE(warnings_.empty());
 }
 
-TEST_F(ExportWorkTest, AServerWithoutRoomForABandIsAskedSomeTimesAndNotForever) {
+TEST_F(ExportWorkTest, StopsAskingAFullServerForABand) {
   const CtSeries series = ReceiveWithCase("a");
   server_->band = absl::ResourceExhaustedError("no memory");
   Ask("exports/1", series);
@@ -137,7 +137,7 @@ TEST_F(ExportWorkTest, WithdrawnExportLeavesTheQueueWithItsPictures) {
   EXPECT_EQ(StateOfExport("exports/3"), BridgeExportState::kAsked);
 }
 
-TEST_F(ExportWorkTest, ACaseOfAnotherBridgeIsLeftToItWhichIsSaid) {
+TEST_F(ExportWorkTest, SkipsAndReportsACaseOfAnotherBridge) {
   std::vector<std::string> said;
   ExportWorkOptions options;
   options.inform = [&said](const std::string& line) { said.push_back(line); };
@@ -151,7 +151,7 @@ TEST_F(ExportWorkTest, ACaseOfAnotherBridgeIsLeftToItWhichIsSaid) {
   EXPECT_THAT(said, ::testing::ElementsAre(HasSubstr("exports/1 has a case of another bridge")));
 }
 
-TEST_F(ExportWorkTest, APacsThatIsDownIsWaitedFor) {
+TEST_F(ExportWorkTest, WaitsForAPacsThatIsDown) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -164,7 +164,7 @@ TEST_F(ExportWorkTest, APacsThatIsDownIsWaitedFor) {
   EXPECT_EQ(Stored().size(), 4);
 }
 
-TEST_F(ExportWorkTest, APacsThatDoesNotLetUsInMayDoSoLater) {
+TEST_F(ExportWorkTest, RetriesAfterThePacsDeniesAccess) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -212,7 +212,7 @@ TEST_F(ExportWorkTest, AMergedPatientGoesBackToThePerson) {
   EXPECT_EQ(Stored().size(), 4);
 }
 
-TEST_F(ExportWorkTest, APatientWhoIsMergedWhileTheServerHearsOfStoringGoesBackToo) {
+TEST_F(ExportWorkTest, PatientMergedDuringStoringNeedsConfirmationAgain) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -252,7 +252,7 @@ class NoHeaderTest : public ExportWorkTest {
   CtSeries series_;
 };
 
-TEST_F(NoHeaderTest, TheKeptHeaderStandsIfTheQueryNamesTheSamePatientAndThatIsSaid) {
+TEST_F(NoHeaderTest, UsesTheKeptHeaderForTheSamePatientAndWarns) {
   EXPECT_THAT(Work("exports/1"), IsOk());
   EXPECT_EQ(StateOfExport("exports/1"), BridgeExportState::kReported);
   EXPECT_EQ(Stored().size(), 4);
@@ -266,7 +266,7 @@ TEST_F(NoHeaderTest, MissingOptionalKeysAreNotAnotherPatient) {
   EXPECT_EQ(Stored().size(), 4);
 }
 
-TEST_F(NoHeaderTest, WhereNobodyIsAskedTheKeptHeaderStands) {
+TEST_F(NoHeaderTest, UsesTheKeptHeaderIfThePacsOffersNoQuery) {
   pacs_->query_service = absl::UnimplementedError("the PACS does not offer C-FIND");
   Merge(series_);
   EXPECT_THAT(Work("exports/1"), IsOk());
@@ -288,7 +288,7 @@ TEST_F(NoHeaderTest, AMergedPatientGoesBackToThePersonAndNothingIsStoredWithTheO
   EXPECT_TRUE(Stored().empty());
 }
 
-TEST_F(NoHeaderTest, AHeaderThatIsTooOldStandsForNothing) {
+TEST_F(NoHeaderTest, IgnoresAHeaderThatIsTooOld) {
   ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer_,
                   {.header_lifetime = std::chrono::seconds(-1)});
   QueuedExport queued = *exports_.Get("exports/1");
@@ -306,7 +306,7 @@ TEST_F(NoHeaderTest, MissingStudyIsReportedAndNothingIsStored) {
 }
 
 // What a PACS refuses with a status is asked again, and nothing else is taken in its place.
-TEST_F(NoHeaderTest, ARefusalIsNoAnswer) {
+TEST_F(NoHeaderTest, RetriesAfterARefusalByThePacs) {
   const absl::Status refused = absl::FailedPreconditionError("answers with status 0xa700");
   for (absl::Status* service : {&pacs_->header_service, &pacs_->query_service}) {
     const absl::Status before = *service;
@@ -343,7 +343,7 @@ class FullDisk {
   sighandler_t handler_ = nullptr;
 };
 
-TEST_F(ExportWorkTest, AFullDiskIsWaitedFor) {
+TEST_F(ExportWorkTest, WaitsWhileTheDiskIsFull) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   Confirm("exports/1");
@@ -370,7 +370,7 @@ class RefusingWriter final : public HeaderWriter {
   int refusals = 0;
 };
 
-TEST_F(ExportWorkTest, DrawingThatFailsIsTriedAgainButNotForEver) {
+TEST_F(ExportWorkTest, RetriesFailedDrawingALimitedNumberOfTimes) {
   RefusingWriter writer;
   ExportWork work(queue_.get(), server_.get(), pacs_.get(), &writer, {});
   const CtSeries series = ReceiveWithCase("a");

@@ -36,7 +36,7 @@ TEST_F(RetentionTest, ImagesAreDeletedWhenTheirTimeIsOverAndTheCaseStays) {
   EXPECT_FALSE(fs::exists(queue_->header_path(kept.key)));
 }
 
-TEST_F(RetentionTest, WhomNoCaseWasMadeOfIsForgottenWithTheHeaders) {
+TEST_F(RetentionTest, ForgetsAPatientWithoutACaseTogetherWithTheHeaders) {
   const CtSeries series = Receive("a", {}, {4});
   WaitQuietly();
   Settle();
@@ -49,13 +49,13 @@ TEST_F(RetentionTest, WhomNoCaseWasMadeOfIsForgottenWithTheHeaders) {
   EXPECT_TRUE(rows_.List()->empty());
 }
 
-TEST_F(RetentionTest, WhoseCaseWasMadeStaysKnown) {
+TEST_F(RetentionTest, RemembersAPatientWithACase) {
   const CtSeries series = ReceiveWithCase("a");
   EXPECT_THAT(DeleteOld(queue_.get(), {}, DaysFromNow(1000)), IsOk());
   EXPECT_EQ(rows_.GetStudy(series.study_uid)->patient.id, "PLANTED-4711");
 }
 
-TEST_F(RetentionTest, AFileOfNoSeriesIsDeletedInItsTime) {
+TEST_F(RetentionTest, DeletesAFileOfNoSeriesAfterItsRetention) {
   CtSeriesOptions one;
   one.study_uid = "1.2.840.1";
   one.series_uid = "1.2.840.2";
@@ -72,7 +72,7 @@ TEST_F(RetentionTest, AFileOfNoSeriesIsDeletedInItsTime) {
   EXPECT_FALSE(fs::exists(stranger.files.front()));
 }
 
-TEST_F(RetentionTest, WhatComesAnewOfAnOldSeriesIsNotDeletedWhileItComes) {
+TEST_F(RetentionTest, KeepsAnOldSeriesWhileNewImagesArrive) {
   const CtSeries series = Receive("a", {}, {4});
   WaitQuietly();
   Settle();
@@ -85,7 +85,7 @@ TEST_F(RetentionTest, WhatComesAnewOfAnOldSeriesIsNotDeletedWhileItComes) {
   EXPECT_TRUE(fs::exists(series.files.front()));
 }
 
-TEST_F(RetentionTest, WhatNobodyConfirmsFailsAndLeavesNoPictures) {
+TEST_F(RetentionTest, UnconfirmedExportFailsAndItsPicturesAreRemoved) {
   const CtSeries series = ReceiveWithCase("a");
   Ask("exports/1", series);
   ASSERT_THAT(work_->Draw(*exports_.Get("exports/1")), IsOk());
@@ -101,7 +101,7 @@ TEST_F(RetentionTest, WhatNobodyConfirmsFailsAndLeavesNoPictures) {
   EXPECT_FALSE(fs::exists(folder));
 }
 
-TEST_F(RetentionTest, HowAnExportHasEndedIsKnownForItsTime) {
+TEST_F(RetentionTest, KeepsTheOutcomeOfAnExportForItsRetention) {
   const CtSeries series = ReceiveWithCase("a");
   for (const char* name : {"exports/1", "exports/2"}) {
     Ask(name, series);

@@ -26,7 +26,7 @@ using ::testing::Not;
 
 class SeriesIntakeTest : public BridgeWork {};
 
-TEST_F(SeriesIntakeTest, ASeriesIsCompleteWhenNothingComesAnyMore) {
+TEST_F(SeriesIntakeTest, SeriesIsCompleteWhenNoMoreImagesArrive) {
   const CtSeries series = Receive("a");
   Settle();
   EXPECT_EQ(StateOf(series), SeriesState::kReceiving);
@@ -35,7 +35,7 @@ TEST_F(SeriesIntakeTest, ASeriesIsCompleteWhenNothingComesAnyMore) {
   EXPECT_EQ(StateOf(series), SeriesState::kChosen);
 }
 
-TEST_F(SeriesIntakeTest, ASeriesIsCompleteAtOnceWhereThePacsCountsAsMany) {
+TEST_F(SeriesIntakeTest, SeriesIsCompleteAtOnceIfThePacsCountMatches) {
   count_ = 8;
   const CtSeries series = Receive("a");
   Settle();
@@ -63,7 +63,7 @@ TEST_F(SeriesIntakeTest, ASeriesThatStopsMidwayIsNotBuiltUntilTheRestCompletesIt
   EXPECT_EQ(StateOf(series), SeriesState::kChosen);
 }
 
-TEST_F(SeriesIntakeTest, AMissingSliceIsSeenWhereNobodyCounts) {
+TEST_F(SeriesIntakeTest, DetectsAMissingSliceWithoutAPacsCount) {
   const CtSeries series = Receive("a", {}, {4});
   WaitQuietly();
   Settle();
@@ -91,7 +91,7 @@ TEST_F(SeriesIntakeTest, CapturesInASeriesHideNoneOfItsSlicesAndGiveNoHeader) {
   EXPECT_EQ(SourcesAmong(*rows_.ListImages(chosen.key)).size(), 8);
 }
 
-TEST_F(SeriesIntakeTest, AnAbortedAssociationLeavesNothingHalf) {
+TEST_F(SeriesIntakeTest, AbortedAssociationLeavesTheSeriesIncomplete) {
   const CtSeries series = Receive("a", {}, {6, 7});
   intake_->Ended({series.series_uid}, false);
   WaitQuietly();
@@ -150,7 +150,7 @@ TEST_F(SeriesIntakeTest, TheChoiceWaitsNoLongerThanTheStudyIsQuiet) {
   EXPECT_EQ(StateOf(series), SeriesState::kChosen);
 }
 
-TEST_F(SeriesIntakeTest, TheChoiceDoesNotWaitForWhatNoRuleTakes) {
+TEST_F(SeriesIntakeTest, ChoiceDoesNotWaitForSeriesThatNoRuleAccepts) {
   count_ = 8;
   elsewhere_ = {{.series_uid = "1.2.840.3", .modality = "SR", .instances = 1}};
   const CtSeries series = Receive("a");
@@ -210,7 +210,7 @@ class ChosenInTwoPartsTest : public SeriesInTwoPartsTest {
   }
 };
 
-TEST_F(ChosenInTwoPartsTest, IsDecidedAnewUntilItsPlanIsBuilt) {
+TEST_F(ChosenInTwoPartsTest, IsReconsideredUntilItsPlanIsBuilt) {
   ReceiveFirst(5);
   EXPECT_EQ(StateOf(series_), SeriesState::kChosen);
   ReceiveRest();
@@ -236,7 +236,7 @@ TEST_F(ChosenInTwoPartsTest, APlanThatWasBuiltOfThePartIsThrownAway) {
   EXPECT_FALSE(fs::exists(queue_->plan_path(series.key)));
 }
 
-TEST_F(ChosenInTwoPartsTest, ABuiltPlanStaysAndTheReasonSaysWhatItLacks) {
+TEST_F(ChosenInTwoPartsTest, BuiltPlanStaysAndTheReasonNamesTheMissingImages) {
   ReceiveFirst(5);
   QueuedSeries series = *rows_.GetByUid(series_.series_uid);
   PutPlan();
@@ -264,7 +264,7 @@ TEST_F(ChosenInTwoPartsTest, ACaseHasTheImagesThatItsPlanWasBuiltOf) {
                                                          series_.instance_uids.begin() + 5));
 }
 
-TEST_F(SeriesInTwoPartsTest, AnotherRecipeLeavesNothingOfTheEarlierPlan) {
+TEST_F(SeriesInTwoPartsTest, AnotherRecipeRemovesTheEarlierPlan) {
   ReceiveFirst(8);
   PutPlan();
   const QueuedSeries series = *rows_.GetByUid(series_.series_uid);
@@ -287,7 +287,7 @@ TEST_F(SeriesIntakeTest, ImageOfAnotherStudyIsReportedAndLeftOut) {
   EXPECT_THAT(kept.reason, HasSubstr("name another study"));
 }
 
-TEST_F(SeriesIntakeTest, OfTwoStudiesNothingIsMade) {
+TEST_F(SeriesIntakeTest, FailsASeriesOfTwoStudies) {
   CtSeriesOptions one;
   one.series_uid = "1.2.840.2";
   const CtSeries series = Receive("a", one);
@@ -310,7 +310,7 @@ TEST_F(SeriesIntakeTest, ChoiceIsReportedOnce) {
   EXPECT_TRUE(again.empty());
 }
 
-TEST_F(SeriesIntakeTest, TwoPatientsOfOneSeriesAreNobodys) {
+TEST_F(SeriesIntakeTest, FailsASeriesOfTwoPatients) {
   CtSeriesOptions one;
   one.study_uid = "1.2.840.1";
   one.series_uid = "1.2.840.2";
@@ -323,7 +323,7 @@ TEST_F(SeriesIntakeTest, TwoPatientsOfOneSeriesAreNobodys) {
   EXPECT_THAT(rows_.GetByUid(series.series_uid)->reason, Not(HasSubstr("OTHER")));
 }
 
-TEST_F(SeriesIntakeTest, AfterARestartWhatLiesThereIsTaken) {
+TEST_F(SeriesIntakeTest, RestartPicksUpTheFilesInTheFolder) {
   const fs::path folder = fs::path(queue_->received_folder()) / "a";
   fs::create_directories(folder);
   const CtSeries series = WriteCtSeries(folder);

@@ -66,20 +66,20 @@ class TissueformCommandTest : public ::testing::Test {
   int port_ = 0;
 };
 
-TEST_F(TissueformCommandTest, GoodWorkIsNoError) { EXPECT_THAT(Run({"--version"}), IsOk()); }
+TEST_F(TissueformCommandTest, SuccessIsNotAnError) { EXPECT_THAT(Run({"--version"}), IsOk()); }
 
-TEST_F(TissueformCommandTest, TheLastLineSaysWhatIsWrong) {
+TEST_F(TissueformCommandTest, ErrorQuotesTheLastLineOfTheCommand) {
   EXPECT_THAT(
       Run({"case", "render", "nothing.tfcase"}),
       StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("this failed: tissueform: ")));
 }
 
-TEST_F(TissueformCommandTest, WhoEndsTheBridgeEndsIt) {
+TEST_F(TissueformCommandTest, CancellationEndsTheCommand) {
   Cancel();
   EXPECT_THAT(Run(Waiting()), StatusIs(absl::StatusCode::kCancelled));
 }
 
-TEST_F(TissueformCommandTest, WhatItMayUseEndsIt) {
+TEST_F(TissueformCommandTest, ExceedingItsLimitsEndsTheCommand) {
   const auto make = [&](const char* keys, const ProgramLimits& limits) {
     return RunTissueform({"token", "keygen", "--out", (folder_ / keys).string()}, "this",
                          (folder_ / "log").string(), kLong, cancel_, limits);
@@ -94,7 +94,7 @@ TEST_F(TissueformCommandTest, ADiskWithoutRoomIsKnown) {
   EXPECT_TRUE(HasRoom("/nowhere")) << "what cannot be asked is no reason to give up";
 }
 
-TEST_F(TissueformCommandTest, ItsTimeEndsIt) {
+TEST_F(TissueformCommandTest, TimeoutEndsTheCommand) {
   EXPECT_THAT(Run(Waiting(), std::chrono::seconds(0)),
               StatusIs(absl::StatusCode::kDeadlineExceeded));
 }

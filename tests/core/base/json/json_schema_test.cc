@@ -95,7 +95,7 @@ TEST(JsonSchemaTest, TheErrorNamesALaterVersionThatAllowsTheValue) {
   EXPECT_THAT(Grown().Check(named), IsOk());
 }
 
-TEST(JsonSchemaTest, AKeyOfNoVersionIsUnknownInEachAndWhatIsAllowedIsOfThatVersion) {
+TEST(JsonSchemaTest, UnknownKeyListsTheKeysAllowedInItsVersion) {
   for (const int version : {1, 2, 3}) {
     EXPECT_THAT(Grown().Check(House(version, R"("roof": 1)")),
                 IsRefused("unknown key \"roof\" at /; allowed there: "));

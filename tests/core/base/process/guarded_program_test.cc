@@ -91,7 +91,7 @@ TEST(GuardedProgramTest, TerminatedProgramMayClearUp) {
   EXPECT_EQ(program->Wait().exit_code, 5);
 }
 
-TEST(GuardedProgramTest, OneThatDoesNotWantToEndIsKilledAfterTheGrace) {
+TEST(GuardedProgramTest, KillsAProgramThatIgnoresTermination) {
   ASSERT_OK_AND_ASSIGN(const auto program,
                        GuardedProgram::Start(Shell(kIgnoresTerm), std::chrono::milliseconds(1)));
   ASSERT_EQ(ReadLine(program->answer()), "begun");
@@ -121,18 +121,18 @@ int ExitCodeWithin(const ProgramLimits& limits, const std::string& script) {
   return program.ok() ? (*program)->Wait().exit_code : -1;
 }
 
-TEST(GuardedProgramTest, ItHasNoMoreProcessorTimeThanItMay) {
+TEST(GuardedProgramTest, LimitsProcessorTime) {
   EXPECT_EQ(ExitCodeWithin({.max_seconds = 1}, "while :; do :; done"), 128 + SIGKILL);
 }
 
-TEST(GuardedProgramTest, ItsFilesAreNoLargerThanTheyMayBe) {
+TEST(GuardedProgramTest, LimitsFileSizes) {
   const std::string file = ::testing::TempDir() + "guarded_file";
   const std::string write = "head -c 4096 /dev/zero > " + file + " && exit 9";
   EXPECT_EQ(ExitCodeWithin({.max_file_bytes = 4096}, write), 9);
   EXPECT_EQ(ExitCodeWithin({.max_file_bytes = 4095}, write), 1) << "told, and not ended";
 }
 
-TEST(GuardedProgramTest, ItHasNoMoreMemoryThanItMay) {
+TEST(GuardedProgramTest, LimitsMemory) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "sanitizers reserve terabytes of addresses";
 #endif
@@ -164,12 +164,12 @@ class KilledStarterTest : public ::testing::Test {
   std::array<int, 2> ends_{};
 };
 
-TEST_F(KilledStarterTest, ItsProgramsEndToo) {
+TEST_F(KilledStarterTest, ItsProgramsEnd) {
   StartAndKill(kLasts, kGrace);
   EXPECT_TRUE(Closes(ends_[0]));
 }
 
-TEST_F(KilledStarterTest, ItsProgramsEndAlsoWhenTheyDoNotWantTo) {
+TEST_F(KilledStarterTest, ItsProgramsEndEvenIfTheyIgnoreTermination) {
   StartAndKill(kIgnoresTerm, std::chrono::milliseconds(1));
   EXPECT_TRUE(Closes(ends_[0]));
 }

@@ -164,7 +164,7 @@ TEST(HelperCallTest, HelperOfAnotherVersionIsRefused) {
               StatusIs(absl::StatusCode::kFailedPrecondition, HasSubstr("another version")));
 }
 
-TEST(HelperCallTest, StartedByHandItExplainsItself) {
+TEST(HelperCallTest, HelperStartedManuallyReportsWrongUse) {
   ChildOptions options;
   ASSERT_OK_AND_ASSIGN(options.program, FindProgram("process_test_helper"));
   options.errors = ChildStream::Null();

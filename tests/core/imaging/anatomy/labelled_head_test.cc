@@ -48,7 +48,7 @@ TEST(ClearByLabelsTest, AirwaysAndTubesBecomeAirInsideTheirBorder) {
   }
 }
 
-TEST(ClearByLabelsTest, WhatLiesOutsideTheLabelledHeadBecomesAir) {
+TEST(ClearByLabelsTest, OutsideOfTheLabelledHeadBecomesAir) {
   LabelledGrid labels = NoLabels();
   Fill(2, 9, SetOf(Structure::kHead), &labels);
   labels.structures.At(6, 6, 6) = 0;  // a hole inside is not outside
@@ -126,7 +126,7 @@ TEST(ApplyLabelsTest, WithAllOfTheLowerJawLabelledNothingElseIsLowerJaw) {
   EXPECT_EQ(head.parts.separation, JawSeparation::kLabels);
 }
 
-TEST(CompareLabelsTest, CountsWhatOnlyOneHas) {
+TEST(CompareLabelsTest, CountsVoxelsOnlyInLabelsOrOnlyInTheImage) {
   LabelledGrid labels = NoLabels();
   labels.structures.At(0, 0, 0) = SetOf(Structure::kLowerJaw);   // the image: cranium
   labels.structures.At(5, 5, 5) = SetOf(Structure::kLowerJaw);   // the image: tissue

@@ -112,7 +112,7 @@ TEST(LandmarksTest, FrontIsSquareToUpAndToTheMidline) {
 
 // A living patient, mouth open, head tilted back; places as seen in pictures of the slices, in the
 // file's frame (x = -201.6 .. 0, z = -138 .. 0). The patient's voxels are 3.2 mm wide.
-TEST(LandmarksTest, ThoseOfALivingHeadAreWherePicturesShowThem) {
+TEST(LandmarksTest, LandmarksOfARealHeadMatchThePictures) {
   CtReadOptions options;
   options.hu_offset = -1024;
   options.axes = "RPI";
@@ -134,7 +134,7 @@ TEST(LandmarksTest, ThoseOfALivingHeadAreWherePicturesShowThem) {
   EXPECT_LT(l.nose_prominence_mm, 20);
 }
 
-TEST(LandmarksTest, WhatIsNotInViewIsNamed) {
+TEST(LandmarksTest, NamesStructuresThatAreNotInView) {
   ASSERT_OK_AND_ASSIGN(const HeadSegmentation head, SegmentHead(HeadPhantom()));
   ASSERT_OK_AND_ASSIGN(BoneParts parts, SeparateBoneParts(head));
   for (uint8_t& label : parts.labels.values) {

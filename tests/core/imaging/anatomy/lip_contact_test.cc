@@ -47,7 +47,7 @@ Landmarks MouthLandmarks() {
   return landmarks;
 }
 
-TEST(LipContactTest, PartedLipsHaveNoneThoughATongueLiesBehind) {
+TEST(LipContactTest, PartedLipsHaveNoContactDespiteATongueBehind) {
   const LipContact contact =
       MeasureLipContact(Mouth([](double) { return false; }), MouthLandmarks());
   EXPECT_GT(contact.examined_mm, 25);
@@ -73,7 +73,7 @@ TEST(LipContactTest, AClosedMouthIsJoinedAllAlong) {
   EXPECT_EQ(contact.width_mm, contact.examined_mm);
 }
 
-TEST(LipContactTest, AThinSheetIsNoContact) {
+TEST(LipContactTest, ThinSheetDoesNotCountAsContact) {
   const LipContact contact =
       MeasureLipContact(Mouth([](double) { return true; }, kLipDepthMm - 2), MouthLandmarks());
   EXPECT_EQ(contact.width_mm, 0);

@@ -148,7 +148,7 @@ TEST(LipSeamCreationTest, AJawThatShowsNoFrontIsNamed) {
       StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the lower jaw shows no front")));
 }
 
-TEST(DentalArchTest, LeavesOutWhatLiesFarOff) {
+TEST(DentalArchTest, LeavesOutOutliers) {
   std::vector<Eigen::Vector2d> points;
   for (int left = -27; left <= 27; left += 3) {
     points.emplace_back(left, ArchFront(kUpperFrontMm, left));

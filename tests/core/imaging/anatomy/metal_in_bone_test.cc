@@ -117,7 +117,7 @@ int64_t BoneInCheek(const HeadSegmentation& head) {
   return count;
 }
 
-TEST(MetalInBoneTest, AStreakIsNoBone) {
+TEST(MetalInBoneTest, StreakIsNotMistakenForBone) {
   const Patient patient = WithStreak();
   ASSERT_OK_AND_ASSIGN(const HeadSegmentation spoilt, SegmentHead(patient.ct));
   EXPECT_GT(BoneInCheek(spoilt), 50);

@@ -162,7 +162,7 @@ TEST(MouthLineTest, ClosedLipsOfWhichTheUpperOneOverhangsAreFound) {
 }
 
 // A hole of 3.5 mm, too low for parted lips, as a removed tube leaves it: tissue 20 mm behind them.
-TEST(MouthLineTest, WhatLiesDeepInTheMouthIsNotSkin) {
+TEST(MouthLineTest, TissueDeepInTheMouthIsNotSkin) {
   FaceRelief relief = GroovedFace(24, [](double) { return 0; });
   relief.front_mm.block(77, 35 - 4, 7, 9) = 40;
   ASSERT_OK_AND_ASSIGN(const MouthLine line, FindMouthLine(relief, 0));

@@ -257,7 +257,7 @@ TEST(RealHeadsTest, ACadaverWithTeethInOcclusionIsTakenApart) {
 }
 
 // Tilted slices of two distances, from the upper jaw up.
-TEST(RealHeadsTest, AHeadWithoutABodyOfTheJawIsReadAndThenRefusedForWantOfIt) {
+TEST(RealHeadsTest, RefusesAHeadWithoutABodyOfTheJaw) {
   const std::string archive =
       SharedDataPath("ct_dicom_ge_two_thicknesses/ge_two_thicknesses.tar.xz");
   if (archive.empty()) GTEST_SKIP() << "the shared data sets are not here";
@@ -272,7 +272,7 @@ TEST(RealHeadsTest, AHeadWithoutABodyOfTheJawIsReadAndThenRefusedForWantOfIt) {
 }
 
 // The bundled head as such a CT: without its lower half, thin slices and then thick ones.
-TEST(RealHeadsTest, UnevenSlicesWithoutAJawAreRefusedForWantOfIt) {
+TEST(RealHeadsTest, RefusesUnevenSlicesWithoutAJaw) {
   CtReadOptions options;
   options.hu_offset = -1024;
   options.axes = "RPI";
@@ -293,7 +293,7 @@ TEST(RealHeadsTest, UnevenSlicesWithoutAJawAreRefusedForWantOfIt) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no lower jaw in view")));
 }
 
-TEST(RealHeadsTest, APlasticSkullIsRefusedForWantOfSkin) {
+TEST(RealHeadsTest, RefusesAPlasticSkullWithoutSkin) {
   const std::string archive =
       SharedDataPath("ct_dicom_philips_tilt/philips_plastic_skull_tilt.tar.xz");
   if (archive.empty()) GTEST_SKIP() << "the shared data sets are not here";

@@ -80,7 +80,7 @@ TEST(SkinRegionsTest, LeftIsThePatientsLeft) {
               ElementsAre(SkinRegion::kLeftCheek, SkinRegion::kRightCheek));
 }
 
-TEST(SkinRegionsTest, BackOfTheHeadForeheadAndNeckHaveNoName) {
+TEST(SkinRegionsTest, BackOfTheHeadForeheadAndNeckHaveNoRegion) {
   EXPECT_THAT(
       RegionsOf({{0, 150, 0}, {0, -10, 80}, {0, 0, -80}, {60, 80, 0}}, UprightFace()),
       ElementsAre(SkinRegion::kNone, SkinRegion::kNone, SkinRegion::kNone, SkinRegion::kNone));

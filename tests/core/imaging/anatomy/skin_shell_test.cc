@@ -121,7 +121,7 @@ TEST(SkinShellTest, ANostrilIsNotPlugged) {
 }
 
 // The layer before the teeth is half air: tissue by its HU.
-TEST(SkinShellTest, BlurredEdgesOfExposedTeethGetNone) {
+TEST(SkinShellTest, BlurredEdgesOfExposedTeethGetNoSkin) {
   const auto in_mouth = [](const Vector3d& p) {
     return std::abs(p.z()) < 9 && std::abs(p.x()) < 16 && p.y() < -20;
   };
@@ -144,7 +144,7 @@ TEST(SkinShellTest, BlurredEdgesOfExposedTeethGetNone) {
 }
 
 // Teeth in a mouth that is wide open, 10 mm behind the lips: no skin is made over them.
-TEST(SkinShellTest, ExposedTeethGetNone) {
+TEST(SkinShellTest, ExposedTeethGetNoSkin) {
   const auto in_mouth = [](const Vector3d& p) {
     return std::abs(p.z()) < 9 && std::abs(p.x()) < 16 && p.y() < -20;
   };

@@ -212,7 +212,7 @@ TEST(TetStiffnessTest, PartialVolumeAtBoneAndAirDoesNotChangeTheTissue) {
   }
 }
 
-TEST(TetStiffnessTest, TetDeepInBoneTakesWhatThereIs) {
+TEST(TetStiffnessTest, TetDeepInBoneUsesBoneVoxels) {
   const GridGeometry grid = Grid(20, 1);
   const HuGrid hu = Fill<int16_t>(grid, [](int, int, int) { return 1200; });
   const LabelGrid bone(grid, 1);
@@ -223,7 +223,7 @@ TEST(TetStiffnessTest, TetDeepInBoneTakesWhatThereIs) {
   EXPECT_EQ(std::accumulate(result.voxels.begin(), result.voxels.end(), 0), 64);
 }
 
-TEST(TetStiffnessTest, WhatDoesNotFitIsRefused) {
+TEST(TetStiffnessTest, RefusesInconsistentInput) {
   const GridGeometry grid = Grid(20, 1);
   const HuGrid hu(grid, 50);
   EXPECT_THAT(ComputeTetStiffness(Cube(1, 18, 4), hu, LabelGrid(grid)),

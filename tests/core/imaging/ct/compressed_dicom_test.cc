@@ -126,7 +126,7 @@ TEST_F(TransferSyntaxTest, SignedValuesOfFewerBitsAreThoseOfTheUncompressedSerie
   }
 }
 
-TEST_F(TransferSyntaxTest, DeflatedFilesAreRefusedAsWhatTheyAre) {
+TEST_F(TransferSyntaxTest, RefusesDeflatedFilesByName) {
   WriteIn(gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian);
   EXPECT_THAT(Read(), StatusIs(absl::StatusCode::kInvalidArgument,
                                AllOf(HasSubstr("no CT slices"), HasSubstr("a deflated file"))));

@@ -157,7 +157,7 @@ TEST_F(DicomSeriesTest, TwoThicknessesOfTheBundledHeadAreRead) {
   EXPECT_NEAR(volume.provenance.wide_gaps[0].from_mm, -1.5 * 48, 1e-6);
 }
 
-TEST_F(DicomSeriesTest, RawBundledHeadWithInterceptZeroSaysWhatToAddAndThenIsRead) {
+TEST_F(DicomSeriesTest, RawBundledHeadIsReadOnceTheSuggestedOffsetIsAdded) {
   ASSERT_OK_AND_ASSIGN(const CtVolume head, ReadBundledHead());
   Series series = SeriesOf(head);
   WriteSeries(series);
@@ -338,7 +338,7 @@ TEST_F(DicomSeriesTest, ManySeriesAreSummedUpInOneLine) {
                                      Not(HasSubstr("series 1 (")), HasSubstr("series_number"))));
 }
 
-TEST_F(DicomSeriesTest, SeriesTooShortForAVolumeDoNotStandInTheWay) {
+TEST_F(DicomSeriesTest, IgnoresSeriesTooShortForAVolume) {
   Series bolus;  // the same place again and again, while contrast comes
   for (int i = 0; i < 5; ++i) bolus.push_back(PhantomSeries({.slices = 1}).front());
   SetEverywhere(DicomFile::kSeriesUid, "UI", "1.2.8", &bolus);

@@ -182,7 +182,7 @@ TEST_F(DicomVolumeTest, OtherSeriesAndOtherFilesAreLeftAsideWithANote) {
                           HasSubstr("1 files that are not DICOM")));
 }
 
-TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithWhatItHolds) {
+TEST_F(DicomVolumeTest, FolderWithoutCtSlicesIsRefusedWithItsContents) {
   Expect(Read(), "the folder is empty");
   std::filesystem::create_directory(Path("inner"));
   Expect(Read(), "no files in it or in the folders below it");
@@ -468,7 +468,7 @@ TEST_F(DicomVolumeTest, NoOffsetIsAdvisedWhereOtherSlicesStateARescale) {
 
 // Old scanners: values HU + 1024, and a rescale that says they were HU already. What one message
 // asks for no other takes back.
-TEST_F(DicomVolumeTest, OffsetStandsBesideARescaleThatLeavesNoHu) {
+TEST_F(DicomVolumeTest, OffsetCorrectsARescaleThatDoesNotGiveHu) {
   std::vector<DicomFile> series = PhantomSeries({.columns = 24, .slices = 12});
   for (DicomFile& file : series) file.Text(DicomFile::kRescaleIntercept, "DS", "0");
   WriteSeries(series);

@@ -18,7 +18,7 @@ std::string SomeBytes(size_t size) {
   return bytes;
 }
 
-TEST(UnpackedSizeTest, CountsWhatGzipAndZlibHold) {
+TEST(UnpackedSizeTest, CountsBytesOfGzipAndZlib) {
   for (const size_t size : {size_t{1}, size_t{1000}, size_t{3'000'000}}) {
     for (const bool gzip : {true, false}) {
       EXPECT_EQ(UnpackedSize(Pack(SomeBytes(size), gzip), 1 << 30), size);
@@ -33,7 +33,7 @@ TEST(UnpackedSizeTest, StreamsOneAfterTheOtherCountTogether) {
   EXPECT_EQ(UnpackedSize(two.substr(0, two.size() - 1), 1 << 30), 0);
 }
 
-TEST(UnpackedSizeTest, WhatIsCutOffOrDamagedHoldsNothing) {
+TEST(UnpackedSizeTest, IsZeroForTruncatedOrDamagedData) {
   const std::string whole = Pack(SomeBytes(100'000), true);
   for (const size_t missing : {size_t{1}, size_t{8}, size_t{100}, whole.size() - 2, whole.size()}) {
     EXPECT_EQ(UnpackedSize(whole.substr(0, whole.size() - missing), 1 << 30), 0) << missing;

@@ -106,7 +106,7 @@ TEST(CylinderFieldTest, IsFoundAlongEveryAxis) {
   EXPECT_EQ(field->axis, 0);
 }
 
-TEST(CylinderFieldTest, ABoxOfNoiseAndARoundHeadInSmoothAirHaveNone) {
+TEST(CylinderFieldTest, NoiseBoxAndRoundHeadInAirHaveNoField) {
   EXPECT_FALSE(FindCylinderField(Head()).has_value());
   CtVolume ball = Head();
   for (int k = 0; k < kSlices; ++k) {
@@ -198,7 +198,7 @@ TEST(GrayValuesTest, HuStayBitwiseAndShiftedHuAreGray) {
   EXPECT_TRUE(report->gray);
 }
 
-TEST(GrayValuesTest, WhatTheRecipeStatesGoesBeforeTheHistogram) {
+TEST(GrayValuesTest, RecipeTakesPrecedenceOverTheHistogram) {
   const CtVolume head = Head();
   CtVolume volume = head;
   volume.has_gray_values = true;  // as the reader says where the recipe does

@@ -62,7 +62,7 @@ TEST(HuCheckTest, ValuesThatCannotBeHuAreGray) {
   EXPECT_THAT(hu.provenance.notes.back(), HasSubstr("no RescaleIntercept"));
 }
 
-TEST(HuCheckTest, TheRecipeDecidesWhatValuesAre) {
+TEST(HuCheckTest, RecipeDecidesTheKindOfValues) {
   CtReadOptions options;
   options.values = CtValues::kHu;
   CtVolume volume = VolumeOf(Head(3000));

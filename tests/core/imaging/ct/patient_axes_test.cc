@@ -53,7 +53,7 @@ TEST(PatientAxesTest, OtherLettersAreRefused) {
   }
 }
 
-TEST(PatientAxesTest, RecipePlacesAFileThatDoesNotSay) {
+TEST(PatientAxesTest, RecipeGivesTheAxesThatAFileLacks) {
   CtVolume volume;
   volume.origin_mm = {1, 2, 3};
   EXPECT_THAT(PlaceVolume(false, "why", "RPI", &volume), IsOk());

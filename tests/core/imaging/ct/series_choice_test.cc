@@ -185,7 +185,7 @@ TEST_F(SeriesChoiceTest, OffsetOfTheRecipeStandsForTheCalibration) {
 }
 
 // Where a slice without a place lies is not known: joining is not advised.
-TEST_F(SeriesChoiceTest, SeriesWithAPlacelessSliceIsNotCalledAPart) {
+TEST_F(SeriesChoiceTest, SeriesWithAnUnplacedSliceIsNotSuggestedForJoining) {
   EXPECT_THAT(ReadBoth([](Series* soft, Series* bone) {
                 MoveTo(-200, soft);
                 (*soft)[40].Erase(DicomFile::kPosition);

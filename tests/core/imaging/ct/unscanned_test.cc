@@ -51,7 +51,7 @@ class UnscannedTest : public ::testing::Test {
   std::normal_distribution<double> noise_{0, 8};
 };
 
-TEST_F(UnscannedTest, OutsideOfTheCircleNothingWasScanned) {
+TEST_F(UnscannedTest, OutsideOfTheCircleIsUnscanned) {
   for (const double fill : {-1024.0, -1000.0}) {
     const CtVolume volume =
         Painted([&](double x, double y) { return InCircle(x, y) ? Noisy(Head(x, y)) : fill; });
@@ -147,7 +147,7 @@ TEST_F(UnscannedTest, DarkStreaksOfMetalAreNotTheCircle) {
   EXPECT_TRUE(FindUnscanned(ct.volume, 2, ct.metal).empty());
 }
 
-TEST_F(UnscannedTest, BesideAStreakTheCircleStillCuts) {
+TEST_F(UnscannedTest, CircleStillCutsNextToAStreak) {
   const auto cut_head = [&](double x, double y, int k) {
     const bool streak = std::abs(k - kMetalSlice) < 2 && std::abs(y + 5) < 4 && x > 10;
     const double head = Head(x, y);
@@ -190,7 +190,7 @@ TEST_F(UnscannedTest, OnTheGridItEndsWhereTheTissueDoes) {
   }
 }
 
-TEST_F(UnscannedTest, BesideASlantedVolumeNothingWasScanned) {
+TEST_F(UnscannedTest, CornersAroundASlantedVolumeAreUnscanned) {
   CtVolume volume = Painted([&](double x, double y) { return Noisy(Head(x, y)); });
   ASSERT_OK_AND_ASSIGN(const LabelGrid upright, ResampleUnscanned(volume, 2, 1));
   EXPECT_TRUE(upright.values.empty());

@@ -286,7 +286,7 @@ TEST_F(SlicedNrrdTest, NumberedAndListedFilesAreReadAndAllCount) {
 }
 
 // As VTK's own headsq has it: ITK reads no "spacings" beside a "space".
-TEST_F(SlicedNrrdTest, SpacingsBesideASpaceSayWhatToDo) {
+TEST_F(SlicedNrrdTest, SpacingsTogetherWithASpaceGetAdvice) {
   const std::string header = NrrdHeader("space: 3D-left-handed\nspacings: 0.5 0.75 1.25\n\n");
   EXPECT_THAT(ReadContents("v.nrrd", header + PhantomBytes<int16_t>(UprightPlace), "RPI"),
               StatusIs(kInvalid, HasSubstr("take the line \"space\" out")));
@@ -336,7 +336,7 @@ TEST_F(VolumeFileTest, NiftiScalingIsApplied) {
   EXPECT_EQ(WorstPhantomError(volume), 0);
 }
 
-TEST_F(VolumeFileTest, FileThatDoesNotSayHowItLiesNeedsAxes) {
+TEST_F(VolumeFileTest, FileWithoutAnOrientationNeedsAxes) {
   const std::string voxels = PhantomBytes<int16_t>(UprightPlace);
   const std::string spacings = "spacings: 0.5 0.75 1.25\n\n";
   const std::string left_handed =
@@ -443,7 +443,7 @@ TEST_F(VolumeFileTest, DataFileElsewhereIsNotRead) {
   EXPECT_THAT(ReadContents("v.nhdr", missing), StatusIs(kInvalid, HasSubstr("cannot be opened")));
 }
 
-TEST_F(VolumeFileTest, WhatIsNotOneVolumeOfNumbersIsRefused) {
+TEST_F(VolumeFileTest, RefusesFilesThatAreNotOneScalarVolume) {
   const std::string voxels = PhantomBytes<int16_t>(UprightPlace);
   EXPECT_THAT(ReadContents("v.nii", NiftiHeader(1, 1, 0, 3) + voxels + voxels + voxels),
               StatusIs(kInvalid, HasSubstr("3 volumes")));
@@ -456,7 +456,7 @@ TEST_F(VolumeFileTest, WhatIsNotOneVolumeOfNumbersIsRefused) {
   EXPECT_THAT(ReadContents("v.nii", "no header"), StatusIs(kInvalid, HasSubstr("damaged")));
 }
 
-TEST_F(VolumeFileTest, VoxelThatIsNoNumberIsRefused) {
+TEST_F(VolumeFileTest, RefusesAVoxelThatIsNotANumber) {
   const std::string header = NrrdHeader(
       "space: LPS\nspace directions: (0.5,0,0) (0,0.75,0) (0,0,1.25)\nspace origin: (-30,20,100)\n"
       "\n",

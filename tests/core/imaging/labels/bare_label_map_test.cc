@@ -109,7 +109,7 @@ TEST(BareLabelMapTest, TextGoesAndTheMapStays) {
   }
 }
 
-TEST(BareLabelMapTest, WhatCannotBeCleanedIsRefused) {
+TEST(BareLabelMapTest, RefusesFilesThatCannotBeCleaned) {
   EXPECT_THAT(WithoutText("a.dcm", "x").status(), StatusIs(kInvalid, HasSubstr("DICOM SEG")));
   EXPECT_THAT(WithoutText("a.nhdr", "x").status(),
               StatusIs(kInvalid, HasSubstr("a file of their own")));

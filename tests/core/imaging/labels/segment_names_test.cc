@@ -94,7 +94,7 @@ TEST(SegmentNamesTest, NamesFromOutsideBecomeShortAndPrintable) {
   EXPECT_EQ(PrintableName(std::string(100, 'a')).size(), 40U);
 }
 
-TEST(SegmentNamesTest, ListsWhatIsNotKnown) {
+TEST(SegmentNamesTest, ListsUnknownSegments) {
   std::vector<LabelSegment> segments = {Numbered(1, 1, 0)};
   segments[0].name = "tumor";
   std::vector<std::string> notes;
@@ -106,7 +106,7 @@ TEST(SegmentNamesTest, ListsWhatIsNotKnown) {
               StatusIs(kInvalid, HasSubstr("has the name \"Bone\" for skull")));
 }
 
-TEST(LabelFactsTest, PassesOverWhatIsNotAsItsWritersWriteIt) {
+TEST(LabelFactsTest, SkipsMalformedEntries) {
   const FactsByLabel nrrd = FactsOfNrrd({{"Segment0_Name", "a"},
                                          {"Segment0_LabelValue", "x"},
                                          {"Segment1_Name", "b"},

@@ -60,7 +60,7 @@ void AddStreaks(CtVolume* volume) {
 // Rises to the middle, no two shells alike: nothing is cut off at a highest value.
 double Enamel(double from_middle) { return 3080 - 70 * from_middle; }
 
-TEST(MetalDetectionTest, EnamelIsNoMetal) {
+TEST(MetalDetectionTest, EnamelIsNotMetal) {
   EXPECT_FALSE(FindMetal(HeadWithTooth(Enamel)).any());
   EXPECT_TRUE(FindMetal(HeadWithTooth(Enamel)).mask.empty());
 }

@@ -104,7 +104,7 @@ struct Defect {
 
 class DefectTest : public ::testing::TestWithParam<Defect> {};
 
-TEST_P(DefectTest, IsSaidAndNothingOfThePatient) {
+TEST_P(DefectTest, IsReportedWithoutPatientData) {
   const SeriesFacts facts = FactsAfter(GetParam().change);
   const std::string against = WhatIsAgainst(facts, SomeRule());
   EXPECT_THAT(against, HasSubstr(GetParam().said));
@@ -169,7 +169,7 @@ struct Stranger {
 
 class StrangerTest : public ::testing::TestWithParam<Stranger> {};
 
-TEST_P(StrangerTest, InASeriesOfCtSlicesIsLeftAsideWithANote) {
+TEST_P(StrangerTest, IsSetAsideInASeriesOfCtSlicesWithANote) {
   for (const bool comes_first : {false, true}) {
     const SeriesFacts facts = FactsAfter([comes_first](Images* images) {
       ImageHeader stranger = images->front();
@@ -249,12 +249,12 @@ TEST(PickSeriesTest, AnEarlierRuleGoesBeforeABetterSeries) {
   EXPECT_EQ(verdicts[1].rule, 0);
 }
 
-TEST(PickSeriesTest, NothingIsChosenOfNothing) {
+TEST(PickSeriesTest, ChoosesNothingWithoutSeriesOrRules) {
   EXPECT_TRUE(PickSeries({}, {SomeRule()}).empty());
   EXPECT_FALSE(PickSeries({FactsOfSeries("a", Head())}, {}).front().chosen);
 }
 
-TEST(SeriesRulesTest, ARuleSaysWhatDiffersFromTheDefaults) {
+TEST(SeriesRulesTest, RuleOverridesOnlyTheGivenDefaults) {
   const auto rules = ParseSeriesRules(
       R"({"format": "tissueform-series-rules", "version": 1, "rules": [
           {"name": "thin", "recipe": "a/recipe.json", "max_spacing_mm": 0.7, "contrast": false,

@@ -38,7 +38,7 @@ class AnswerBytesTest : public ::testing::TestWithParam<Evaluated> {
   std::string bytes_;
 };
 
-TEST_P(AnswerBytesTest, ComeBackAsTheyWentAndAreAligned) {
+TEST_P(AnswerBytesTest, RoundTripAndAreAligned) {
   const AnswerReading reading = ReadAnswers(bytes_);
   ASSERT_EQ(reading.error, AnswerError::kNone) << reading.message;
   EXPECT_EQ(reading.message, "");
@@ -47,7 +47,7 @@ TEST_P(AnswerBytesTest, ComeBackAsTheyWentAndAreAligned) {
   EXPECT_EQ(bytes_.substr(0, 8), "TFANSWER");
 }
 
-TEST_P(AnswerBytesTest, EveryBeginningIsRefusedAndSoIsMore) {
+TEST_P(AnswerBytesTest, TruncatedOrExtendedBytesAreRefused) {
   for (size_t size = 0; size < bytes_.size(); size += size < 1000 ? 1 : 997) {
     const AnswerReading reading = ReadAnswers(bytes_.substr(0, size));
     EXPECT_NE(reading.error, AnswerError::kNone) << size;
@@ -57,7 +57,7 @@ TEST_P(AnswerBytesTest, EveryBeginningIsRefusedAndSoIsMore) {
   EXPECT_EQ(ReadAnswers(bytes_ + std::string(16, '\0')).error, AnswerError::kBroken);
 }
 
-TEST_P(AnswerBytesTest, ErrorsSayWhatIsWrong) {
+TEST_P(AnswerBytesTest, ErrorsNameTheirCause) {
   EXPECT_EQ(ReadAnswers("").error, AnswerError::kNotAnswers);
   EXPECT_EQ(ReadAnswers(bytes_, bytes_.size()).error, AnswerError::kNone);
   AnswerReading reading = ReadAnswers(bytes_, bytes_.size() - 1);
@@ -77,7 +77,7 @@ TEST_P(AnswerBytesTest, ErrorsSayWhatIsWrong) {
 
 // Readers of earlier versions pass over the sections of a third order or of contact, and would
 // answer by the others alone.
-TEST_P(AnswerBytesTest, SayTheLowestVersionThatHasThem) {
+TEST_P(AnswerBytesTest, StateTheLowestVersionThatSupportsThem) {
   EXPECT_EQ(bytes_[8], static_cast<char>(GetParam().version));
   for (uint32_t version = 1; version <= kAnswerFormatVersion; ++version) {
     Put(8, version);
@@ -87,7 +87,7 @@ TEST_P(AnswerBytesTest, SayTheLowestVersionThatHasThem) {
 }
 
 // Of the second section: number, type, offset, count.
-TEST_P(AnswerBytesTest, ATableThatLiesIsFound) {
+TEST_P(AnswerBytesTest, InconsistentTableIsRefused) {
   const size_t entry = kHeadBytes + kEntryBytes;
   const std::string good = bytes_;
   for (const auto& [at, value] : std::vector<std::pair<size_t, uint32_t>>{

@@ -82,7 +82,7 @@ TEST_P(EvaluatedModelTest, ChosenVerticesAreWhereTheWholeAnswerHasThem) {
   EXPECT_FALSE(AnswerAt(evaluator, poses, chosen, of_chosen.data()));
 }
 
-TEST_P(EvaluatedModelTest, PosesThatNobodyMayAskForAreNotCovered) {
+TEST_P(EvaluatedModelTest, InvalidPosesAreNotCovered) {
   const AnswerEvaluator evaluator(response_->Describe());
   std::vector<float> positions = {1, 2, 3};
   const auto handles = static_cast<size_t>(GetParam().num_handles);
@@ -125,7 +125,7 @@ TEST_P(EvaluatedModelTest, SizesThatDoNotFitAreFound) {
   EXPECT_GE(sections, 9);
 }
 
-TEST_P(EvaluatedModelTest, NumbersThatAreNoneAreFound) {
+TEST_P(EvaluatedModelTest, NonFiniteNumbersAreFound) {
   const PortableAnswers answers = response_->Describe();
   VisitSections(answers, [&](uint32_t number, const auto& values) {
     using Value = typename std::remove_cvref_t<decltype(values)>::value_type;

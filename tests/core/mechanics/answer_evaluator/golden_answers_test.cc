@@ -152,7 +152,7 @@ class GoldenAnswersTest : public ::testing::TestWithParam<Evaluated> {
   std::unique_ptr<VertexResponse> response_;
 };
 
-TEST_P(GoldenAnswersTest, AreWhatIsMadeToday) {
+TEST_P(GoldenAnswersTest, MatchTheAnswersMadeToday) {
   const Json file = {{"answers", GetParam().name + ".bin"}, {"cases", MakeCases()}};
   WriteGolden(GetParam().name, response_->Describe(), file);
   const std::string golden = ReadGolden(GetParam().name, ".bin");
@@ -223,7 +223,7 @@ class GoldenSealTest : public ::testing::Test {
   std::unique_ptr<VertexResponse> response_;
 };
 
-TEST_F(GoldenSealTest, IsWhatIsMadeToday) {
+TEST_F(GoldenSealTest, MatchesTheAnswersMadeToday) {
   const Json file = {{"answers", "linear_elastic_seal.bin"}, {"cases", MakeCases()}};
   WriteGolden("linear_elastic_seal", response_->Describe(), file);
   ASSERT_OK_AND_ASSIGN(const AnswerEvaluator kept, GoldenEvaluator("linear_elastic_seal"));

@@ -58,7 +58,7 @@ TEST(ContactRowTest, ThereAreLimits) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("the limit is 1000")));
 }
 
-TEST(ContactRowTest, WhatIsWrongIsNamedWithItsRow) {
+TEST(ContactRowTest, ErrorNamesTheInvalidRow) {
   const ContactRow good = {.vertex = 1};
   const struct {
     ContactRow row;

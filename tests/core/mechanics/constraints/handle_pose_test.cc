@@ -166,7 +166,7 @@ TEST(PartOfPoseTest, PartOfAPartIsThePartOfTheirProduct) {
   ExpectSame(once, twice);
 }
 
-TEST(PartOfPoseTest, NoneIsRestAndThePivotStays) {
+TEST(PartOfPoseTest, ZeroPartIsRestAndThePivotStays) {
   ExpectSame(PartOfPose(Turned(), 0), RestOf(Turned()));
   for (const double t : {0.1, 0.3, 0.9, 1.5}) {
     EXPECT_EQ(PartOfPose(Turned(), t).pivot_mm, Turned().pivot_mm);

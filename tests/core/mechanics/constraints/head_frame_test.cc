@@ -121,7 +121,7 @@ TEST(HeadAnglesTest, NearTheGimbalRotationsStillComeBack) {
 }
 
 // By hand, in words: what the signs mean for a patient.
-TEST(HeadAnglesTest, SignsAreWhatAPlannerExpects) {
+TEST(HeadAnglesTest, SignsMatchClinicalConventions) {
   const HeadFrame frame;
   const auto turned = [&](const HeadAngles& angles, const Vector3d& point) {
     return Vector3d(RotationMatrix(RotationVectorFromAngles(angles, frame)) * point);

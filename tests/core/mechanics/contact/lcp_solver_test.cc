@@ -272,7 +272,7 @@ TEST(LcpSolverTest, GaussSeidelGivesTheSameAnswerToTheLastBit) {
   }
 }
 
-TEST(LcpSolverTest, ReportsWhenTheBoundsAreUsedUp) {
+TEST(LcpSolverTest, ReportsWhenItsStepLimitsAreExhausted) {
   RandomNumbers random(21);
   const Eigen::MatrixXd C = LineCompliance(80, 40);
   const Eigen::VectorXd q = RandomVector(80, &random);

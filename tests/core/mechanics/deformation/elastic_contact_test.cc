@@ -194,7 +194,7 @@ TEST_F(BlockOnPlateTest, IsPushedUpByTheRightForceAndLeftAloneBelow) {
   }
 }
 
-TEST_F(BlockOnPlateTest, AGapAtRestIsUsedUpFirst) {
+TEST_F(BlockOnPlateTest, ClosesTheInitialGapBeforeContact) {
   AddPlate(/*gap_mm=*/0.25);
   const auto deformer = CreateLinearElasticDeformer(Prepare(constrained_, plate_));
   ASSERT_THAT(deformer, IsOk());
@@ -425,7 +425,7 @@ absl::StatusOr<ConstraintSet> BetweenItsEnds(const TetMesh& bar, std::vector<Con
   return ConstraintSet::Create(bar, ends.fixed(), ends.handles(), std::move(rows));
 }
 
-TEST(ElasticContactTest, WhoDoesNotComputeContactSaysSo) {
+TEST(ElasticContactTest, EveryModelAcceptsContact) {
   const TetMesh mesh = Bar({3, 3, 4});
   const auto constraints = BetweenItsEnds(mesh, {{.vertex = 20}});
   ASSERT_THAT(constraints, IsOk());

@@ -81,7 +81,7 @@ TEST(ElasticSystemTest, AdmissionIsAskedForTheFactorAndThenForTheColumns) {
   EXPECT_GE((*elastic)->bytes_held(), asked[0] + asked[1]);
 }
 
-TEST(ElasticSystemTest, WhatTheAdmissionRefusesIsRefused) {
+TEST(ElasticSystemTest, ReturnsTheRefusalOfTheAdmission) {
   for (const int allowed : {0, 1}) {
     int calls = 0;
     const auto refuse = [&calls, allowed](int64_t) {

@@ -229,7 +229,7 @@ TEST(LipSealTest, AnOpenedMouthReleasesTheLips) {
   }
 }
 
-TEST(LipSealTest, WhatCannotMoveIsRefused) {
+TEST(LipSealTest, RefusesPairsThatCannotMove) {
   PartedBlock block;
   const LipEdge edge = block.Edge();
   block.rows.push_back(

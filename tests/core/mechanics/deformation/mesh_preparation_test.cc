@@ -102,7 +102,7 @@ TEST_F(MeshPreparationTest, AnOrderThatIsGivenIsTheOneThatIsUsed) {
   EXPECT_EQ(short_by_one->node_order(), found->node_order()) << "passed over";
 }
 
-TEST_F(MeshPreparationTest, BytesAreThoseOfWhatWasMade) {
+TEST_F(MeshPreparationTest, BytesHeldGrowWithPreparedParts) {
   const auto preparation = Prepare();
   const int64_t empty = preparation->bytes_held();
   ASSERT_OK_AND_ASSIGN(const auto propagated, CreateGradientFieldDeformer(preparation, {}));

@@ -134,7 +134,7 @@ TEST(NeoHookeanDeformerTest, FullTwistIsNotRest) {
   EXPECT_EQ(InvertedTets(*preparation, answer.positions), 0);
 }
 
-TEST(NeoHookeanDeformerTest, LinearStartThatInvertsTetsIsNoObstacle) {
+TEST(NeoHookeanDeformerTest, ConvergesFromALinearStartThatInvertsTets) {
   const auto preparation = PrepareBar().value();
   const HandlePose pose = Pose({0.5, 0, 0}, {0, 0, -6.5});
   const Positions linear =

@@ -85,7 +85,7 @@ TEST(StallWatchTest, StallsWhenTheResidualHasNotHalvedInTime) {
   EXPECT_TRUE(watch.HasStalled(0.7));
 }
 
-TEST(StallWatchTest, WaitsAnewWhereTheResidualHasHalved) {
+TEST(StallWatchTest, RestartsItsPatienceWhenTheResidualHasHalved) {
   StagnationDetector watch(3);
   for (const double residual : {1.0, 0.9, 0.5, 0.4, 0.3}) {
     EXPECT_FALSE(watch.HasStalled(residual));
@@ -150,14 +150,14 @@ TEST(NewtonFallbackTest, AHandleDoesNotPassThroughAThinRegionAsAWhole) {
   EXPECT_NEAR(answer.summary.load, 0.4, 0.01);
 }
 
-TEST(NewtonFallbackTest, RunningOutOfIterationsIsSaid) {
+TEST(NewtonFallbackTest, ReportsRunningOutOfIterations) {
   const Deformation answer =
       Solve(PrepareBar().value(), {.max_iterations = 2}, {Pose({0, 0, 0}, {1, 0, 2})});
   EXPECT_EQ(answer.summary.gave_up, Termination::kIterations);
   EXPECT_EQ(answer.summary.obstacle, "");
 }
 
-TEST(NewtonFallbackTest, LeavesAloneWhatLbfgsFinds) {
+TEST(NewtonFallbackTest, IsNotUsedWhenLbfgsConverges) {
   const auto preparation = PrepareBar({}, 2).value();
   const std::vector<HandlePose> poses = {Pose({0.3, 0, 0.4}, {1, 0, 1.5}),
                                          Pose({0, 0, 0}, {0, 1, -1})};

@@ -28,7 +28,7 @@ int ExitCodeOfAsking(const char* chosen_kernels) {
     }
     std::string program = "blas_threads_test";
     std::string filter =
-        "--gtest_filter=BlasThreadsTest.ProgramStartsAnewOnlyWhereItsKernelsDoNotFit";
+        "--gtest_filter=BlasThreadsTest.ProgramRestartsOnlyIfItsKernelsDoNotFit";
     std::array<char*, 3> argv = {program.data(), filter.data(), nullptr};
     RestartWithFittingBlasKernels(argv.data());
     _exit(7);  // it has returned
@@ -43,7 +43,7 @@ bool NeedsOthers() {
          __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
 }
 
-TEST(BlasThreadsTest, ProgramStartsAnewOnlyWhereItsKernelsDoNotFit) {
+TEST(BlasThreadsTest, ProgramRestartsOnlyIfItsKernelsDoNotFit) {
   if (std::getenv("OPENBLAS_CORETYPE") != nullptr) {
     EXPECT_FALSE(NeedsOthers());  // this is the program that was restarted
     return;

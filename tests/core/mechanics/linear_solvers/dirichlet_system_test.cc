@@ -108,7 +108,7 @@ TEST(DirichletSystemTest, UnknownsWithoutEntriesKeepZero) {
   EXPECT_EQ(solution(1, 0), 0);
 }
 
-TEST(DirichletSystemTest, EverythingPrescribedNeedsNoFactor) {
+TEST(DirichletSystemTest, SolvesWithoutAFactorIfEverythingIsPrescribed) {
   const SparseMatrix K = BarLaplacian();
   std::vector<int32_t> all(K.rows());
   std::iota(all.begin(), all.end(), 0);

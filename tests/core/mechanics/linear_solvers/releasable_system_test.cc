@@ -34,7 +34,7 @@ std::vector<int32_t> Without(std::vector<int32_t> all, const std::vector<int32_t
   return all;
 }
 
-TEST(ReleasableSystemTest, AnswersAsAFactorThatNeverHadWhatIsReleased) {
+TEST(ReleasableSystemTest, AnswersLikeAFactorWithoutTheReleasedUnknowns) {
   const SparseMatrix K = BarLaplacian();
   std::vector<int32_t> all(75);  // three layers of the bar, neighbours of each other
   std::iota(all.begin(), all.end(), 0);
@@ -60,7 +60,7 @@ TEST(ReleasableSystemTest, AnswersAsAFactorThatNeverHadWhatIsReleased) {
   }
 }
 
-TEST(ReleasableSystemTest, WhatIsReleasedCannotBeHeldAgain) {
+TEST(ReleasableSystemTest, ReleasedUnknownsCannotBeHeldAgain) {
   ASSERT_OK_AND_ASSIGN(const auto system, ReleasableSystem::Create(BarLaplacian(), {3, 5, 9}, {}));
   EXPECT_THAT(system->KeepOnly({3, 4, 9}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("unknown 4")));

@@ -210,7 +210,7 @@ TEST_F(NodeOrderTest, AnOrderOfAnotherNumberOfNodesIsPassedOver) {
   EXPECT_EQ(SolveIn(longer).order, found.order);
 }
 
-TEST_F(NodeOrderTest, WhatIsNoPermutationIsRefused) {
+TEST_F(NodeOrderTest, RefusesAnOrderThatIsNotAPermutation) {
   std::vector<int32_t> twice = SolveIn({}).order;
   twice[1] = twice[0];
   const auto cholesky = CreateSparseCholesky(CholeskyBackend::kCholmod, {.node_order = twice});

@@ -99,7 +99,7 @@ TEST(BoundedLeastSquaresTest, BentValleyIsFollowedToItsBottomAndToItsWall) {
 }
 
 // Of all x with x0 + x1 = 2 and anything for x2.
-TEST(BoundedLeastSquaresTest, OfEqualAnswersThatOfTheOtherRowsIsTaken) {
+TEST(BoundedLeastSquaresTest, RegularizationRowsDecideBetweenEqualSolutions) {
   MatrixXd J(1, 3);
   J << 1, 1, 0;
   LeastSquaresProblem problem = Linear(J, VectorXd::Constant(1, 2));

@@ -108,7 +108,7 @@ TEST_F(FitProblemTest, SymmetryLeavesTurnsAboutXAndMovesAcrossIt) {
   EXPECT_THAT(Resolve(), StatusIs(kInvalid, HasSubstr("which symmetry leaves")));
 }
 
-TEST_F(FitProblemTest, PointsOffTheSkinSayHowFarAndWhereItIs) {
+TEST_F(FitProblemTest, PointOffTheSkinReportsDistanceAndNearestSkin) {
   target().point_mm = Vector3d(-5.5, 4, 8);
   EXPECT_THAT(Resolve(),
               StatusIs(kInvalid, AllOf(HasSubstr("target \"side\""), HasSubstr("5.50 mm off"),

@@ -265,7 +265,7 @@ class ShortBarTest : public ::testing::Test {
   FitRequest request_{.moving = AllMay(bar_.constraints(), 25, 5)};
 };
 
-TEST_F(ShortBarTest, OneNumberForSixFreedomsMovesLeastAndSaysWhatIsUndetermined) {
+TEST_F(ShortBarTest, OneTargetMovesLeastAndReportsUndeterminedDirections) {
   request_.targets = {Along("side", 1)};
   ASSERT_OK_AND_ASSIGN(const PlanFit fit, bar_.Fit(request_));
   EXPECT_LT(fit.targets[0].missed_mm, 0.005);
@@ -289,7 +289,7 @@ TEST_F(ShortBarTest, OneNumberForSixFreedomsMovesLeastAndSaysWhatIsUndetermined)
 }
 
 // The slope of the answer by the target, measured by asking for 1 mm more.
-TEST_F(ShortBarTest, ErrorOfAnUnknownIsWhatAnotherWishMakesOfIt) {
+TEST_F(ShortBarTest, ErrorOfAnUnknownIsItsSlopeByTheTarget) {
   request_.targets = {Along("side", 1)};
   request_.moving[0].rotation = {};
   request_.moving[0].translation = {std::array{-5.0, 5.0}};
@@ -334,7 +334,7 @@ TEST_F(ShortBarTest, SymmetricHandlesStayInTheirPlane) {
   EXPECT_EQ(fit.poses[0].rotation_vector.tail<2>(), Eigen::Vector2d::Zero());
 }
 
-TEST_F(ShortBarTest, WithoutAFullModelThePreparedAnswerIsTheLastWord) {
+TEST_F(ShortBarTest, WithoutVerificationUsesThePreparedAnswer) {
   request_.targets = {Along("side", 1)};
   ASSERT_OK_AND_ASSIGN(const PlanFit fit, bar_.Fit(request_, /*verify=*/false));
   EXPECT_FALSE(fit.verified);

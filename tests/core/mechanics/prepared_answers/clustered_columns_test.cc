@@ -70,7 +70,7 @@ TEST(ClusteredColumnsTest, EveryVertexIsAnsweredWithinTheRoomAtItsPlaceInTheAnsw
   }
 }
 
-TEST(ClusteredColumnsTest, EveryClusterKeepsWhatIsUsedThere) {
+TEST(ClusteredColumnsTest, EveryClusterKeepsOnlyTheColumnsUsedThere) {
   const Line line;
   const PortableAnswers clustered = line.Clustered(line.Uses(1e-2));
   EXPECT_EQ(clustered.cluster_vertices.size(), size_t{kVertices});
@@ -80,7 +80,7 @@ TEST(ClusteredColumnsTest, EveryClusterKeepsWhatIsUsedThere) {
   EXPECT_GT(ColumnsOf(clustered), 6);
 }
 
-TEST(ClusteredColumnsTest, DigitsGrowWithWhatIsAskedFor) {
+TEST(ClusteredColumnsTest, PrecisionGrowsWithTheRequestedAccuracy) {
   const Line line;
   const PortableAnswers coarse = line.Clustered(line.Uses(1e-2));
   const PortableAnswers fine = line.Clustered(line.Uses(1e-5));

@@ -100,7 +100,7 @@ TEST(ColumnCompressionTest, BoundHoldsForEveryUse) {
 }
 
 // Two columns that are always used together are one.
-TEST(ColumnCompressionTest, WhatIsUsedTogetherIsSaidOnce) {
+TEST(ColumnCompressionTest, MergesColumnsThatAreUsedTogether) {
   const Eigen::MatrixXd columns = Eigen::MatrixXd::Random(kRows, 6);
   ColumnWeights uses = RandomUses(6, 1);
   for (Eigen::MatrixXd* some : {&uses.typical, &uses.widest}) {
@@ -114,7 +114,7 @@ TEST(ColumnCompressionTest, WhatIsUsedTogetherIsSaidOnce) {
   EXPECT_GE(CutBoundMm(compression, alone), ErrorOf(compression, columns, alone));
 }
 
-TEST(ColumnCompressionTest, WhatNoTypicalUseNeedsIsKeptForTheWidest) {
+TEST(ColumnCompressionTest, KeepsColumnsThatOnlyTheWidestUseNeeds) {
   const Eigen::MatrixXd columns = Eigen::MatrixXd::Random(kRows, 4);
   ColumnWeights uses = RandomUses(4, 1);
   uses.typical.row(2).setZero();

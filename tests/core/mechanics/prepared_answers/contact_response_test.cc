@@ -144,7 +144,7 @@ TEST_F(ContactResponseTest, TravelsAsBytesOfVersionThree) {
   }
 }
 
-TEST_F(ContactResponseTest, WhatDoesNotFitIsRefused) {
+TEST_F(ContactResponseTest, RefusesInconsistentSections) {
   const PortableAnswers good = response_->Describe();
   ASSERT_THAT(CheckAnswers(good), IsEmpty());
   const auto broken = [&good](auto change) {

@@ -132,7 +132,7 @@ TEST_P(NeoHookeanResponseTest, EstimateIsSeldomExceeded) {
 
 // Over 1,000 random poses, most of them none that the cut was judged by: what the answer of few
 // columns and digits lies from that of all is what the estimate has been raised by.
-TEST_P(NeoHookeanResponseTest, CompressionPutsOffByNoMoreThanIsSaid) {
+TEST_P(NeoHookeanResponseTest, CompressionErrorStaysWithinItsEstimate) {
   const Prepared fine(GetParam());
   // With one handle these few vertices need all triples at 0.002, and what large poses are put off
   // by counts.
@@ -164,7 +164,7 @@ TEST_P(NeoHookeanResponseTest, CompressionPutsOffByNoMoreThanIsSaid) {
 INSTANTIATE_TEST_SUITE_P(Handles, NeoHookeanResponseTest, ::testing::Values(1, 2, 3),
                          [](const auto& test) { return "With" + std::to_string(test.param); });
 
-TEST(NeoHookeanResponseCoverTest, CoversItsRangeAndNoScale) {
+TEST(NeoHookeanResponseCoverTest, CoversItsRangeButNoScaling) {
   const auto preparation = testing::PrepareMesh(JitteredBar(), 1);
   ASSERT_OK_AND_ASSIGN(const auto response,
                        CreateNeoHookeanResponse(preparation, {1, 5, 100},

@@ -59,7 +59,7 @@ class ResponseBasisTest : public ::testing::TestWithParam<std::tuple<TetMesh (*)
 };
 
 // A frame reads no more of the columns than its tolerance needs: the looser, the less.
-TEST_P(ResponseBasisTest, BoundHoldsForEveryToleranceAndShowsWhatWasRead) {
+TEST_P(ResponseBasisTest, BoundHoldsAndTheErrorFollowsTheTolerance) {
   std::vector<double> errors;
   for (const double tolerance : {1e-2, 1e-4, 1e-6}) {
     ResponseBasisOptions options;
@@ -217,7 +217,7 @@ TEST(ResponseBasisReductionTest, HandlesAtRestAreAsGoodAsFixed) {
             basis_of_three->ErrorBoundMm(poses_of_three) + basis_of_one->ErrorBoundMm(poses));
 }
 
-TEST(ResponseBasisCoverTest, EdgeOfTheRangeBelongsToItAndNothingBeyond) {
+TEST(ResponseBasisCoverTest, CoversTheEdgeOfTheRangeAndNothingBeyond) {
   Prepared prepared(JitteredBar(), 1, {});
   std::vector<HandlePose> poses(1);
   poses[0].rotation_vector = {0, 0, 30 * kDegree};

@@ -42,7 +42,7 @@ class SeriesCalibrationTest : public ::testing::TestWithParam<bool> {
 };
 
 // The same pose at several sizes, whose errors are as the estimate has them.
-TEST_P(SeriesCalibrationTest, IsTheAllowanceTimesWhatWasMeasured) {
+TEST_P(SeriesCalibrationTest, IsTheAllowanceTimesTheMeasuredError) {
   const Eigen::VectorXd numbers = Eigen::VectorXd::Random(6);
   const auto error = [](double size) { return 0.3 * size * size * size; };
   std::vector<MeasuredSeries> measured;

@@ -59,7 +59,7 @@ TEST_P(ThirdOrderLengthsTest, RatioIsThatOfTheDisplacementsLengths) {
   }
 }
 
-TEST_P(ThirdOrderLengthsTest, RestAndColumnsOfNothingHaveNone) {
+TEST_P(ThirdOrderLengthsTest, RestAndZeroColumnsHaveZeroRatio) {
   Columns columns(3 * GetParam());
   EXPECT_EQ(columns.Ratio(Eigen::VectorXd::Zero(6)), 0);
   columns.second.setZero();

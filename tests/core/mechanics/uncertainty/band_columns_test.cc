@@ -65,7 +65,7 @@ TEST(BandColumnsTest, AreNearThoseOfTheNonlinearModel) {
 }
 
 // Where linear elasticity takes a turn for strain, and where columns were not kept for it.
-TEST(BandColumnsTest, TurnsBeyondTheRangeHaveNone) {
+TEST(BandColumnsTest, TurnsBeyondTheRangeHaveNoBand) {
   UncertainBar bar(DeformationModel::kLinearElastic);
   const std::vector<int32_t> vertices = AllVertices(bar.mesh);
   ASSERT_OK_AND_ASSIGN(const auto columns,

@@ -154,7 +154,7 @@ TEST_P(ElasticExpansionTest, WithContactItEqualsDifferencesOfFullAnswersThatPres
   }
 }
 
-TEST(MaterialExpansionTest, ContactHasToBeSaid) {
+TEST(MaterialExpansionTest, ContactMustBeStated) {
   const testing::PartedBlock block;
   const Eigen::VectorXd stiffness = Eigen::VectorXd::Constant(block.mesh.num_tets(), 10000);
   const auto preparation = *MeshPreparation::Create(block.mesh, stiffness, block.Constraints(), {});

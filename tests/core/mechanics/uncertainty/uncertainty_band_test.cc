@@ -78,7 +78,7 @@ TEST(UncertaintyBandTest, EqualsThatOfFullAnswers) {
   EXPECT_GE(ShareWithin15Percent(band.normal_mm, expected.normal_mm), 0.95);
 }
 
-TEST(UncertaintyBandTest, NeverLessAlongTheNormalThanNothingNorMoreThanInAll) {
+TEST(UncertaintyBandTest, NormalBandIsNonNegativeAndWithinTheTotal) {
   const UncertainBar bar(DeformationModel::kLinearElastic);
   const UncertaintyBand band = BandOf(bar);
   EXPECT_GE(band.normal_mm.minCoeff(), 0);
@@ -98,7 +98,7 @@ TEST(UncertaintyBandTest, DoesNotDependOnThreads) {
   EXPECT_EQ(BandOf(bar, 1).size_mm, BandOf(bar, 3).size_mm);
 }
 
-TEST(UncertaintyBandTest, KnownMaterialHasNone) {
+TEST(UncertaintyBandTest, KnownMaterialHasNoBand) {
   UncertainBar bar(DeformationModel::kLinearElastic);
   for (auto& tissue : bar.uncertainty.tissues) tissue.factor_95 = 1;
   EXPECT_EQ(BandOf(bar).size_mm.maxCoeff(), 0);

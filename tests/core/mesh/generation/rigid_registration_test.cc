@@ -111,7 +111,7 @@ Positions OutwardOf(const TriangleMesh& mesh) {
 
 // The front of a bone, seen again by a scanner that shows all of it 0.4 mm thicker: only a fit that
 // looks for the thickness does not take it for a way forward.
-TEST(RigidRegistrationTest, FindsByHowMuchTheTargetStandsOut) {
+TEST(RigidRegistrationTest, FindsTheOffsetOfAThickerTarget) {
   std::mt19937 random(11);
   const RigidMove known = RandomMove(&random, 8, 8);
   const TriangleMesh lump = Lump(48);
@@ -144,7 +144,7 @@ TEST(RigidRegistrationTest, ReportsWhatDoesNotFit) {
   EXPECT_GT(found.all_rms_mm, 1);
 }
 
-TEST(RigidMoveTest, AMoveAndItsInverseAreNone) {
+TEST(RigidMoveTest, ComposingAMoveWithItsInverseIsTheIdentity) {
   std::mt19937 random(7);
   const RigidMove move = RandomMove(&random, 90, 50);
   const RigidMove none = Composed(move, Inverse(move));

@@ -46,7 +46,7 @@ TEST(DecimateSurfaceTest, EdgesOfACubeStaySharp) {
   EXPECT_NEAR(report.area_mm2, 6e4, 1);
 }
 
-TEST(DecimateSurfaceTest, WhatHasFewTrianglesStays) {
+TEST(DecimateSurfaceTest, KeepsASurfaceWithFewTriangles) {
   const TriangleMesh cube = CubeSurface(2, false);
   ASSERT_OK_AND_ASSIGN(const TriangleMesh same, DecimateSurface(cube, 1000));
   EXPECT_EQ(same.triangles(), cube.triangles());

@@ -91,7 +91,7 @@ TEST_F(DamagedMeshTest, TheUndamagedTextIsRead) {
   EXPECT_EQ(file.cell_data.size(), 1U);
 }
 
-TEST_F(DamagedMeshTest, FieldDataOfAnyLengthAreNoDamage) {
+TEST_F(DamagedMeshTest, AcceptsFieldDataOfAnyLength) {
   ASSERT_OK_AND_ASSIGN(
       const TetMeshFile file,
       ReadWith("<UnstructuredGrid>",
@@ -136,7 +136,7 @@ TEST_F(DamagedMeshTest, OtherFormatsBehindTheEndingAreNamed) {
   EXPECT_THAT(Read(""), IsRefused("empty"));
 }
 
-TEST_F(DamagedMeshTest, XmlThatIsNoUnstructuredGridIsRefused) {
+TEST_F(DamagedMeshTest, RefusesXmlThatIsNotAnUnstructuredGrid) {
   EXPECT_THAT(Read("<html><body>404</body></html>"), IsRefused("not a .vtu file"));
   EXPECT_THAT(ReadWith("UnstructuredGrid", "PolyData"), IsRefused("VTK XML polygons (.vtp)"));
   EXPECT_THAT(ReadWith("UnstructuredGrid", "ImageData"), IsRefused("not a .vtu file"));
@@ -230,14 +230,14 @@ TEST_F(DamagedMeshTest, SeveralPiecesAreRefused) {
       IsRefused("several pieces"));
 }
 
-TEST_F(DamagedMeshTest, CellThatIsNoTetIsNamedWithItsType) {
+TEST_F(DamagedMeshTest, NamesTheTypeOfACellThatIsNotATet) {
   EXPECT_THAT(ReadWith(">10<", ">12<"), IsRefused("cell 0 is a vtkHexahedron (type 12)"));
   EXPECT_THAT(ReadWith(">10<", ">14<"), IsRefused("cell 0 is a vtkPyramid (type 14)"));
   EXPECT_THAT(ReadWith(">10<", ">78<"), IsRefused("cell 0 is a"));
   EXPECT_THAT(ReadWith(">10<", ">200<"), IsRefused("cell 0 is a"));
 }
 
-TEST_F(DamagedMeshTest, FacesAloneAreNoMesh) {
+TEST_F(DamagedMeshTest, RefusesAMeshOfFacesOnly) {
   EXPECT_THAT(ReadWith(">10<", ">9<"),
               IsRefused("no tets: its 1 cells are points, lines or faces"));
 }

@@ -139,7 +139,7 @@ TEST_F(Gmsh1FormTest, OtherSolidsAreNamedAndFacesLeftOut) {
   EXPECT_EQ(file.mesh.num_vertices(), 4);
 }
 
-TEST_F(Gmsh1FormTest, WhatIsMissingOfADamagedFileIsNamed) {
+TEST_F(Gmsh1FormTest, NamesTheMissingPartOfADamagedFile) {
   const std::string good = BytesOfFile(TestDataPath("meshes/two_tets/gmsh1_ascii.msh"));
   const std::string cut = good.substr(0, good.find("$ENDELM"));
   EXPECT_THAT(Read("cut.msh", cut),

@@ -236,7 +236,7 @@ std::vector<Commented> CommentedFiles() {
   };
 }
 
-TEST_F(SurfaceFormatsTest, WhatStatesRasIsTurnedToLps) {
+TEST_F(SurfaceFormatsTest, ConvertsFilesThatStateRasToLps) {
   for (const Commented& file : CommentedFiles()) {
     for (const auto& [words, space, sign] : {std::tuple("SPACE=RAS", FileSpace::kRas, -1.0),
                                              std::tuple("SPACE=LPS", FileSpace::kLps, 1.0),
@@ -278,7 +278,7 @@ TEST_F(SurfaceFormatsTest, FaceWithoutItsVertexIsRefused) {
                              HasSubstr("a face refers to a vertex that is not there"))));
 }
 
-TEST_F(SurfaceFormatsTest, TetMeshIsNoSurface) {
+TEST_F(SurfaceFormatsTest, RefusesATetMeshAsASurface) {
   EXPECT_THAT(ReadTriangleMesh(TestDataPath("meshes/two_tets/gmsh41_ascii.msh")),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("a surface is needed")));
 }

@@ -135,7 +135,7 @@ TEST_F(TetFormatsTest, GmshKeepsGroupsAndData) {
   }
 }
 
-TEST_F(TetFormatsTest, GmshDataThatSkipTetsAreNotANumberThere) {
+TEST_F(TetFormatsTest, TetsSkippedByGmshDataGetNan) {
   std::string text = BytesOfFile(TwoTets("gmsh22_ascii.msh"));
   const std::string both = "2\n1 3000\n2 15000.5\n";
   text.replace(text.find(both), both.size(), "1\n2 15000.5\n");
@@ -155,7 +155,7 @@ TEST_F(TetFormatsTest, GmshNodesThatNoTetUsesAreLeftOut) {
   EXPECT_EQ(file.mesh.positions().row(3), Eigen::RowVector3d(0, 0, 1));
 }
 
-TEST_F(TetFormatsTest, GmshCellsThatAreNoLinearTetsAreNamed) {
+TEST_F(TetFormatsTest, NamesGmshCellsThatAreNotLinearTets) {
   const std::string nodes =
       "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n6\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 0 "
       "1\n6 0 1 1\n$EndNodes\n";

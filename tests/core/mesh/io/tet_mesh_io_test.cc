@@ -190,7 +190,7 @@ TEST_F(TetMeshIoTest, ArrayOfTheWrongLengthIsRefusedAndTheOldFileStays) {
   EXPECT_THAT(FilesLeft(), ::testing::ElementsAre("tet.vtu"));
 }
 
-TEST_F(TetMeshIoTest, ArrayNamesThatReadersStumbleOverAreRefused) {
+TEST_F(TetMeshIoTest, RefusesArrayNamesThatReadersCannotHandle) {
   for (const std::string& name : {std::string(), std::string("a\nb"), std::string(300, 'x')}) {
     TetMeshFile file = OnlyMesh(SingleTet());
     file.cell_data.push_back({name, 1, std::vector<double>{1}});

@@ -86,7 +86,7 @@ TEST(DisplacementCodecTest, NumbersLieByAxisInLittleEndian) {
   EXPECT_EQ(bytes, std::string("\xff\x7f\x01\x80\x01\x00\x00\x00\xfe\xff\x02\x01", 12));
 }
 
-TEST(DisplacementCodecTest, WhatRestsAndWhatIsEmptyNeedsNoStep) {
+TEST(DisplacementCodecTest, ZeroAndEmptyFieldsNeedNoStep) {
   const CodedDisplacements still = EncodeDisplacements(FloatPositions::Zero(7, 3));
   EXPECT_EQ(still.step_mm, 0);
   ASSERT_OK_AND_ASSIGN(const Positions zero, DecodeDisplacements(still.bytes, 0, 7));
@@ -95,7 +95,7 @@ TEST(DisplacementCodecTest, WhatRestsAndWhatIsEmptyNeedsNoStep) {
   EXPECT_THAT(DecodeDisplacements(none.bytes, none.step_mm, 0), IsOk());
 }
 
-TEST(DisplacementCodecTest, NumbersThatAreNoneAreSeenByTheReceiver) {
+TEST(DisplacementCodecTest, ReceiverRefusesNonFiniteNumbers) {
   for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
     FloatPositions field = SmoothField(10, 1);
     field(4, 1) = bad;
@@ -105,7 +105,7 @@ TEST(DisplacementCodecTest, NumbersThatAreNoneAreSeenByTheReceiver) {
   }
 }
 
-TEST(DisplacementCodecTest, WhatDoesNotFitIsRefused) {
+TEST(DisplacementCodecTest, RefusesInconsistentBytes) {
   const auto refused = [](const std::string& bytes, double step, int64_t count, const char* text) {
     EXPECT_THAT(DecodeDisplacements(bytes, step, count),
                 StatusIs(absl::StatusCode::kDataLoss, HasSubstr(text)));

@@ -59,7 +59,7 @@ TEST(MeshReaderCallTest, LibraryThatEndsTheProgramEndsOnlyTheHelper) {
   EXPECT_THAT(Call("crash"), StatusIs(kInvalid, HasSubstr("crashed while reading it")));
 }
 
-TEST(MeshReaderCallTest, WhateverIsThrownIsAnError) {
+TEST(MeshReaderCallTest, ThrownExceptionsBecomeErrors) {
   EXPECT_THAT(Call("throw an exception"), StatusIs(kInvalid, HasSubstr("odd")));
   EXPECT_THAT(Call("throw a number"), StatusIs(kInvalid, HasSubstr("gave up")));
 }
@@ -86,7 +86,7 @@ TEST(MeshReaderCallTest, MeshLargerThanTheLimitIsNotTakenOver) {
               StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("memory")));
 }
 
-TEST(MeshReaderCallTest, WhatTheLibraryPrintsIsLostAndItCannotWriteFiles) {
+TEST(MeshReaderCallTest, LibraryCannotPrintOrWriteFiles) {
   const auto path = std::filesystem::path(::testing::TempDir()) / "mesh_reader_call_test.file";
   std::filesystem::remove(path);
   ::testing::internal::CaptureStdout();

@@ -138,7 +138,7 @@ TEST(BadCaseTest, AFileThatIsCutOffAnywhereIsRefused) {
   }
 }
 
-TEST(BadCaseTest, WhatFollowsTheEndIsRefused) {
+TEST(BadCaseTest, DataAfterTheEndIsRefused) {
   EXPECT_THAT(ParseCase(GoodCase() + "more"), StatusIs(kInvalid, HasSubstr("and has")));
   std::string longer = GoodCase() + "more";
   SetWord(&longer, 8, static_cast<uint32_t>(longer.size()));
@@ -167,13 +167,13 @@ TEST(BadCaseTest, RandomDamageIsRefusedOrHarmless) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST(BadCaseTest, OtherFilesAreNoCases) {
+TEST(BadCaseTest, RefusesOtherFiles) {
   EXPECT_THAT(ParseCase(""), StatusIs(kInvalid, HasSubstr("glTF")));
   EXPECT_THAT(ParseCase("solid stl\nendsolid\n"), StatusIs(kInvalid, HasSubstr("glTF")));
   EXPECT_THAT(ReadCase("/no/such.tfcase"), StatusIs(absl::StatusCode::kNotFound));
 }
 
-TEST(BadCaseTest, AMeshThatIsNotTheOneOfItsNameIsDamaged) {
+TEST(BadCaseTest, RefusesAMeshThatDoesNotMatchItsName) {
   const Glb glb = *ParseGlb(GoodCase(), kMaxCaseJsonBytes);
   const std::string changed =
       WithView(glb.views.size() - 1, [](char* bytes, size_t size) { bytes[size / 2] ^= 1; });

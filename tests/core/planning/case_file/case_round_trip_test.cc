@@ -61,7 +61,7 @@ TEST(CaseRoundTripTest, SurfacesComeBackToTheBit) {
   }
 }
 
-TEST(CaseRoundTripTest, WithoutRangesThereAreNone) {
+TEST(CaseRoundTripTest, CaseWithoutRangesReadsBackWithoutRanges) {
   CaseFile contents = SampleCase();
   contents.material_ranges.reset();
   ASSERT_OK_AND_ASSIGN(const std::string bytes, SerializeCase(contents));
@@ -129,7 +129,7 @@ TEST(CaseRoundTripTest, TextWithMarkupStaysText) {
   EXPECT_EQ(read.handles[0].label, contents.handles[0].label);
 }
 
-TEST(CaseRoundTripTest, WhatBreaksARuleIsNotWritten) {
+TEST(CaseRoundTripTest, DoesNotWriteAnInvalidCase) {
   CaseFile contents = SampleCase();
   contents.surfaces[1].handle = "nobody";
   EXPECT_THAT(SerializeCase(contents),

@@ -78,7 +78,7 @@ TEST_F(PredictedCaseTest, ASegmentWithoutAPoseIsRefused) {
               HasSubstr("no pose for the handle \"top\""));
 }
 
-TEST_F(PredictedCaseTest, WhatIsNoNumberIsRefused) {
+TEST_F(PredictedCaseTest, RefusesNonFiniteNumbers) {
   Positions deformed = rest_;
   deformed(0, 0) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(PredictCase(case_, deformed, {{"top", {}}}).status().message(),

@@ -58,7 +58,7 @@ TEST(SkinComparisonTest, ASheetInFrontIsSoFarInFrontBothWays) {
   EXPECT_NEAR(comparisons[0].compared_share, 0.81, 1e-9);
 }
 
-TEST(SkinComparisonTest, WhatTheOperatedSurfaceDoesNotReachIsNotCompared) {
+TEST(SkinComparisonTest, ComparesOnlySkinThatTheOperatedSurfaceReaches) {
   const TriangleMesh sheet = Sheet(20, 1);
   ComparedFace predicted{sheet.positions(), sheet.triangles(), std::vector<uint8_t>(441, 1)};
   const SignedSurface half(Shifted(Sheet(10, 1), {0, 1, 0}));

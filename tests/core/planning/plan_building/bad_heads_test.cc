@@ -178,7 +178,7 @@ RawVolume WithTeethHiddenByMetal(const RawVolume& head) {
   return hidden;
 }
 
-TEST(BadHeadsTest, TeethThatMetalHidesWhollyNeedThePlaneOfTheRecipe) {
+TEST(BadHeadsTest, TeethHiddenByMetalNeedAnOcclusalPlane) {
   const RawVolume hidden = WithTeethHiddenByMetal(BundledHead());
   EXPECT_THAT(Build(hidden), StatusIs(absl::StatusCode::kInvalidArgument,
                                       AllOf(HasSubstr("cm3) hides the teeth"),
@@ -247,7 +247,7 @@ TEST(BadHeadsTest, AHeadTurnedByQuartersIsNamedAsItLies) {
   EXPECT_EQ(turns, 23);
 }
 
-TEST(BadHeadsTest, TwoHeadsAreRefusedBesideAndAboveEachOther) {
+TEST(BadHeadsTest, TwoHeadsNextToOrAboveEachOtherAreRefused) {
   const RawVolume head = BundledHead();
   for (const std::array<int, 3>& at :
        {std::array<int, 3>{66, 0, 0}, std::array<int, 3>{52, 0, 0}, std::array<int, 3>{0, 0, 97},

@@ -112,7 +112,7 @@ class BadConeBeamTest : public ::testing::Test {
   }
 };
 
-TEST_F(BadConeBeamTest, WithoutBoneSaysSo) {
+TEST_F(BadConeBeamTest, ReportsMissingBone) {
   EXPECT_THAT(Outcome([](ConeBeam* beam, CtVolume* helical) {
                 beam->noise_hu = 20;
                 for (int16_t& hu : helical->hu) hu = std::min(hu, int16_t{60});
@@ -121,12 +121,12 @@ TEST_F(BadConeBeamTest, WithoutBoneSaysSo) {
                        HasSubstr("do not show air, soft tissue and bone")));
 }
 
-TEST_F(BadConeBeamTest, OfTheUpperJawAloneSaysWhatIsMissing) {
+TEST_F(BadConeBeamTest, UpperJawAloneReportsTheMissingJaw) {
   EXPECT_THAT(Outcome([](ConeBeam* beam, CtVolume*) { beam->low_z_mm = -85; }),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("jaw")));
 }
 
-TEST_F(BadConeBeamTest, OfAFewTeethSaysThatItIsAPartOfTheHead) {
+TEST_F(BadConeBeamTest, VolumeOfAFewTeethIsRefused) {
   EXPECT_THAT(Outcome([](ConeBeam* beam, CtVolume*) {
                 beam->radius_mm = 35;
                 beam->axis_mm = {-98, 60};

@@ -78,7 +78,7 @@ TEST_F(BundledHeadTest, TheFrameIsThePatients) {
   EXPECT_NEAR(Found().landmarks.midsagittal.HeightMm(frame.origin_mm), 0, 1e-9);
 }
 
-TEST_F(BundledHeadTest, WhatIsNotInViewIsNotFound) {
+TEST_F(BundledHeadTest, FindsNoFrankfortPlaneThatIsOutOfView) {
   // Without what lies over the nose, as in a CT of the jaws.
   HuGrid low = Found().head.hu;
   for (int z = 0; z < low.geometry.size[2]; ++z) {
@@ -90,7 +90,7 @@ TEST_F(BundledHeadTest, WhatIsNotInViewIsNotFound) {
   EXPECT_FALSE(FindFrankfort(low, 250, Found().landmarks).has_value());
 }
 
-TEST_F(BundledHeadTest, LandmarksOfNoHeadGiveNothing) {
+TEST_F(BundledHeadTest, ImplausibleLandmarksGiveNoFrankfortPlane) {
   Landmarks wrong = Found().landmarks;
   wrong.condyle.left.z() += 20;  // one ear is looked for far too high
   EXPECT_FALSE(FindFrankfort(Found().head.hu, 250, wrong).has_value());
@@ -132,7 +132,7 @@ TEST_F(ChooseHeadFrameTest, GivenPlanesComeFirst) {
   EXPECT_EQ(straight.left, Vector3d::UnitX());
 }
 
-TEST_F(ChooseHeadFrameTest, PlanesOfNoHeadAreRefused) {
+TEST_F(ChooseHeadFrameTest, RefusesImplausibleHeadPlanes) {
   const Plane up{Vector3d::Zero(), Vector3d::UnitZ()};
   const Plane left{Vector3d::Zero(), Vector3d::UnitX()};
   const Plane down{Vector3d::Zero(), -Vector3d::UnitZ()};

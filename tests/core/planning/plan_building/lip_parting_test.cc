@@ -135,7 +135,7 @@ TEST(LipPartingTest, ABundledHeadGetsASeamAndRowsThatItsFilesSay) {
   EXPECT_TRUE(off.constraints.contact().empty());
 }
 
-TEST(LipPartingTest, ALineBesideTheTissueIsRefused) {
+TEST(LipPartingTest, RefusesAMouthLineOutsideTheTissue) {
   Recipe recipe = BundledRecipe();
   for (Eigen::Vector3d& place : recipe.lips.mouth_line_mm) place.z() += 300;
   EXPECT_THAT(BuildPlan(BundledCt(), recipe).status(),

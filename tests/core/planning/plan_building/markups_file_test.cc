@@ -60,7 +60,7 @@ TEST(MarkupsFileTest, PlanesHaveANormalOrThreePoints) {
   EXPECT_FALSE(markups->at(3).plane.has_value());
 }
 
-TEST(MarkupsFileTest, WhatIsNotMarkupsIsRefused) {
+TEST(MarkupsFileTest, RefusesInvalidMarkups) {
   const auto said = [](const std::string& text) {
     const auto markups = ParseMarkups(text);
     EXPECT_FALSE(markups.ok()) << text;
@@ -122,7 +122,7 @@ TEST(GivenLandmarksTest, TakeThePlaceOfFoundOnes) {
   EXPECT_THAT(notes[0], HasSubstr("pogonion"));
 }
 
-TEST(GivenLandmarksTest, OnesThatCannotBeAreRefused) {
+TEST(GivenLandmarksTest, RefusesImpossibleLandmarks) {
   const auto said = [](const GivenLandmarks& given) {
     Landmarks landmarks = SomeLandmarks();
     std::optional<FrankfortLandmarks> frankfort;

@@ -209,7 +209,7 @@ constexpr DeformationModel kModels[] = {DeformationModel::kGradientField, Deform
                                         DeformationModel::kNeoHookean};
 
 // The demo drags the bundled jaw to 8 mm.
-TEST(PlanBuilderTest, PlanMadeAnewCanBeDraggedFartherThanPlannedByAnyModel) {
+TEST(PlanBuilderTest, RebuiltPlanCanBeDraggedBeyondItsMoveByAnyModel) {
   SetBlasThreads(1);
   ASSERT_OK_AND_ASSIGN(const Recipe recipe, ReadRecipe(TestDataPath("plans/head/recipe.json")));
   ASSERT_OK_AND_ASSIGN(const PlanBuild build,
@@ -323,7 +323,7 @@ TEST(BundledMandibleTest, ChinFollowsTheJawAndTheNoseDoesNot) {
   }
 }
 
-TEST(BundledThreeSegmentsPlanTest, IsWhatItsRecipeSays) {
+TEST(BundledThreeSegmentsPlanTest, MatchesItsRecipe) {
   ASSERT_OK_AND_ASSIGN(const Plan plan, ReadPlan(TestDataPath("plans/three_segments/plan.json")));
   ASSERT_OK_AND_ASSIGN(const Recipe recipe,
                        ReadRecipe(TestDataPath("plans/three_segments/recipe.json")));

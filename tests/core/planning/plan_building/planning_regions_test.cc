@@ -132,7 +132,7 @@ TEST(PlanningRegionsTest, ACutIsFreeOnBothSidesWhereNothingIsDissected) {
   EXPECT_EQ(CutBone(kMandible).Held(0), HeldUpTo(9, 12));
 }
 
-TEST(PlanningRegionsTest, WhatIsDissectedIsFreeAndThePieceHoldsUpToTheCut) {
+TEST(PlanningRegionsTest, DissectedBoneIsFreeAndThePieceHoldsUpToTheCut) {
   EXPECT_EQ(CutBone(kMandible).Held(8), HeldUpTo(6, 11));
 }
 
@@ -140,7 +140,7 @@ TEST(PlanningRegionsTest, BoneOfTheOtherJawIsNotDissected) {
   EXPECT_EQ(CutBone(kCranium).Held(8), HeldUpTo(9, 12));
 }
 
-TEST(PlanningRegionsTest, BoneHoldsWhatTouchesItAndAirNothing) {
+TEST(PlanningRegionsTest, BoneHoldsAdjacentVerticesAndAirHoldsNone) {
   const Column column(20);
   ASSERT_OK_AND_ASSIGN(const PlanningRegions regions, column.Assign(3));
   for (Eigen::Index v = 0; v < column.mesh.num_vertices(); ++v) {
@@ -153,7 +153,7 @@ TEST(PlanningRegionsTest, BoneHoldsWhatTouchesItAndAirNothing) {
   EXPECT_EQ(regions.freed_by_contact, 0);
 }
 
-TEST(PlanningRegionsTest, CutsAreFixedAndNoSkin) {
+TEST(PlanningRegionsTest, CutsAreFixedAndNotSkin) {
   Column column(20);
   column.soft_tissue.region.below = {{0, 0, 9.7}, Eigen::Vector3d::UnitZ()};
   ASSERT_OK_AND_ASSIGN(const PlanningRegions regions, column.Assign(1));
@@ -177,7 +177,7 @@ TEST(PlanningRegionsTest, CutsNearASegmentAreFree) {
   }
 }
 
-TEST(PlanningRegionsTest, TissueThatIsLeftOutIsNoSkin) {
+TEST(PlanningRegionsTest, BorderToOmittedTissueIsNotSkin) {
   Column column(20);
   std::fill(column.hu.values.begin(), column.hu.values.end(), int16_t{40});  // brain instead of air
   ASSERT_OK_AND_ASSIGN(const PlanningRegions regions, column.Assign(3));
@@ -192,7 +192,7 @@ TEST(PlanningRegionsTest, BonesNearOneAnotherLeaveBothSidesFree) {
                                                HasSubstr("smaller \"contact_band_mm\""))));
 }
 
-TEST(PlanningRegionsTest, ATetIsNotHeldByTwo) {
+TEST(PlanningRegionsTest, RefusesTetsBetweenTwoBonesWithoutFreeVertices) {
   const Column column(2);  // every tet reaches from bone to bone
   EXPECT_THAT(column.Assign(0),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("no vertices left")));

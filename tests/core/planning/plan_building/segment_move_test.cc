@@ -106,7 +106,7 @@ TEST(SegmentMoveTest, EulerAnglesTurnInTheOrderZxyUnlessTheFileSaysZyx) {
   EXPECT_LT((zyx->rotation.transpose() - (z * y * x).toRotationMatrix()).norm(), 1e-12);
 }
 
-TEST(SegmentMoveTest, RefusesWhatIsNotRigidWithTheReason) {
+TEST(SegmentMoveTest, RefusesNonRigidTransformsWithTheReason) {
   const auto said = [](const std::string& text) {
     const auto move = ParseItkTransform(text);
     EXPECT_FALSE(move.ok());

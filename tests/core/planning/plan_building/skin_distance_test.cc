@@ -54,7 +54,7 @@ TEST(SkinDistanceTest, OtherThresholdsLieElsewhere) {
   EXPECT_NEAR(distance.mean_mm, 2, 1e-9);
 }
 
-TEST(SkinDistanceTest, OnlySkinIsMeasuredAndWhatIsTooFarIsCounted) {
+TEST(SkinDistanceTest, MeasuresOnlySkinAndCountsVerticesTooFarAway) {
   const SkinDistance part =
       MeasureSkinDistance(SquareAt(11), {false, true, false, false}, Ramp(), 0);
   EXPECT_EQ(part.mm.size(), 1U);

@@ -44,7 +44,7 @@ TEST(SliceGapCheckTest, GapOfLeaningSlicesIsAlongTheirNormal) {
   EXPECT_TRUE(WidestGapInRegion({{normal, highest - 0.1, 50, 7}}, Block()).has_value());
 }
 
-TEST(SliceGapCheckTest, AirIsNoTissue) {
+TEST(SliceGapCheckTest, IgnoresGapsInAir) {
   SoftTissue tissue = Block();
   for (int y = 0; y < 21; ++y) {
     for (int x = 0; x < 21; ++x) {

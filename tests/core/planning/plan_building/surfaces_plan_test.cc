@@ -347,7 +347,7 @@ struct BadSurfaces {
   const char* said;
 };
 
-TEST_F(SurfacesPlanTest, RefusesWhatTheFileMustNotSay) {
+TEST_F(SurfacesPlanTest, RefusesInvalidSurfacesFiles) {
   const std::vector<BadSurfaces> cases = {
       {"no jaw", [](Json* j) { j->erase("lower_jaw"); }, "lower_jaw"},
       {"both", [](Json* j) { (*j)["scale"] = 2; }, "exclude each other"},
@@ -381,7 +381,7 @@ TEST_F(SurfacesPlanTest, RefusesWhatTheFileMustNotSay) {
   }
 }
 
-TEST_F(SurfacesPlanTest, RefusesCoordinatesThatCannotBe) {
+TEST_F(SurfacesPlanTest, RefusesImplausibleCoordinates) {
   TransformAll(Eigen::Vector3d(0.001, 0.001, 0.001).asDiagonal());
   EXPECT_THAT(Refusal(), HasSubstr("\"units\": \"m\""));
   TransformAll(Eigen::Vector3d(-1, -1, 1).asDiagonal());
@@ -399,7 +399,7 @@ TEST_F(SurfacesPlanTest, RefusesCoordinatesThatCannotBe) {
 }
 
 // Two ways to one plan: from a CT, and from the surfaces of skin and bones of that CT alone.
-TEST(SurfacesOfBundledHeadTest, PredictsWhatThePlanOfTheCtPredicts) {
+TEST(SurfacesOfBundledHeadTest, PredictsTheSameAsThePlanOfTheCt) {
   Recipe recipe;
   recipe.ct.hu_offset = -1024;
   recipe.ct.axes = "RPI";

@@ -77,7 +77,7 @@ class ContactTrialTest : public ::testing::Test {
   int64_t num_inverted_ = -1;
 };
 
-TEST_F(ContactTrialTest, WhatTearsIsReleasedAndTheRestHeld) {
+TEST_F(ContactTrialTest, ReleasesTearingContactsAndHoldsTheRest) {
   ASSERT_GT(InvertedTets(DeformationModel::kGradientField, 2), 0);
   const size_t fixed_before = VerticesWith(kFixedBone).size();
   ASSERT_OK_AND_ASSIGN(const int64_t freed, Release(2));
@@ -103,7 +103,7 @@ TEST_F(ContactTrialTest, NothingIsReleasedWhereNothingTears) {
   EXPECT_EQ(at_rest, 0);
 }
 
-TEST_F(ContactTrialTest, WhatIsReleasedDoesNotDependOnThreads) {
+TEST_F(ContactTrialTest, ReleasedContactsDoNotDependOnThreads) {
   const PlanningRegions before = regions_;
   ASSERT_OK_AND_ASSIGN(const int64_t freed, Release(2, 1));
   const std::vector<uint8_t> by_one = regions_.anatomy;
@@ -117,7 +117,7 @@ TEST_F(ContactTrialTest, WhatIsReleasedDoesNotDependOnThreads) {
 
 // One vertex in a stiff lump is moved, and squeezes a soft layer under it that touches nothing
 // held.
-TEST_F(ContactTrialTest, WhatHoldsATornTetFromAfarIsReleased) {
+TEST_F(ContactTrialTest, ReleasesADistantContactThatTearsATet) {
   const Eigen::Vector3d lone(2, 2, 5);
   for (Eigen::Index v = 0; v < mesh_.num_vertices(); ++v) {
     const Eigen::Vector3d p = mesh_.positions().row(v);

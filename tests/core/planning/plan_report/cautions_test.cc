@@ -26,7 +26,7 @@ PlanBuild WholeHead() {
   return build;
 }
 
-TEST(CautionsTest, AWholeHeadNeedsNone) { EXPECT_THAT(Cautions(WholeHead()), IsEmpty()); }
+TEST(CautionsTest, CompleteHeadNeedsNoCaution) { EXPECT_THAT(Cautions(WholeHead()), IsEmpty()); }
 
 TEST(CautionsTest, ReportsAMissingNoseAndChin) {
   PlanBuild build = WholeHead();
@@ -38,7 +38,7 @@ TEST(CautionsTest, ReportsAMissingNoseAndChin) {
 }
 
 // The margin of the grid about the surfaces is not head.
-TEST(CautionsTest, ThoseOfSurfacesNameNoCt) {
+TEST(CautionsTest, CautionsForSurfacesDoNotMentionACt) {
   PlanBuild build = WholeHead();
   build.surface_roles = {"skin", "skull", "lower jaw"};
   build.head.head = LabelGrid(build.head.hu.geometry);

@@ -56,7 +56,7 @@ TEST(CutTetsTest, TrianglesHaveTheColourOfTheirTet) {
   }
 }
 
-TEST(CutTetsTest, NothingBehindThePlaneIsNoTriangle) {
+TEST(CutTetsTest, NothingBehindThePlaneGivesNoTriangles) {
   const TetMesh tet = testing::SingleTet();
   const Plane far{{0, 0, 1e3}, Eigen::Vector3d::UnitZ()};
   EXPECT_EQ(CutTets(tet, far, {kBlue}).triangles.rows(), 0);

@@ -34,14 +34,14 @@ PlanBuild WithMetal() {
   return build;
 }
 
-TEST(MetalReportTest, AMouthWithoutMetalNeedsNoWord) {
+TEST(MetalReportTest, MouthWithoutMetalNeedsNoCaution) {
   const PlanBuild build = testing::PlanBuildOfMesh();
   EXPECT_THAT(MetalCautions(build), IsEmpty());
   EXPECT_FALSE(MetalJson(build)["found"].get<bool>());
   EXPECT_THAT(DrawMetalSlices(build).before, IsEmpty());
 }
 
-TEST(MetalReportTest, TheCautionSaysHowMuchAndWhere) {
+TEST(MetalReportTest, CautionStatesAmountAndPlaceOfMetal) {
   EXPECT_THAT(MetalCautions(WithMetal()),
               ElementsAre(HasSubstr("3 pieces of 0.9 cm3 together, from z = 2.0 to 16.0 mm. Its "
                                     "artifacts were reduced in 8 slices")));

@@ -59,7 +59,7 @@ TEST(ReportHtmlTest, CautionsHaveASectionIfThereAreAny) {
   EXPECT_THAT(PlanReportHtml(report, {}), Not(HasSubstr("Limitations of this CT")));
 }
 
-TEST(ReportHtmlTest, HeadingsNameWhatThePlanIsFrom) {
+TEST(ReportHtmlTest, HeadingsNameTheSourceOfThePlan) {
   nlohmann::ordered_json report = SmallReport(false);
   EXPECT_THAT(PlanReportHtml(report, {}),
               AllOf(HasSubstr("<h1>Planning model from a CT: <span class=\"failed\">not ready"),
@@ -84,7 +84,7 @@ TEST(ReportHtmlTest, TheMouthLineIsDescribedInWords) {
                     Not(HasSubstr("<script")), Not(HasSubstr("1234"))));
 }
 
-TEST(ReportHtmlTest, PageSaysWhatIsMetAndThatItIsNoMedicalDevice) {
+TEST(ReportHtmlTest, PageListsMetRequirementsAndTheMedicalDeviceNotice) {
   const std::string good = PlanReportHtml(SmallReport(true), {});
   EXPECT_THAT(good, AllOf(HasSubstr("all requirements are met"), Not(HasSubstr("not met")),
                           HasSubstr("moved by 5 mm and turned by 2°")));

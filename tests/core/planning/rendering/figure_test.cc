@@ -194,7 +194,7 @@ int ConnectTo(const std::string& display) {
   return -1;
 }
 
-TEST(VirtualDisplayTest, EndsAlsoWhenItsStarterIsKilled) {
+TEST(VirtualDisplayTest, EndsWhenItsStarterIsKilled) {
   const ScopedEnvironment no_display("DISPLAY", nullptr);
   testing::KilledStarter starter([]() -> std::string {
     auto display = VirtualDisplay::Open();
@@ -210,7 +210,7 @@ TEST(VirtualDisplayTest, EndsAlsoWhenItsStarterIsKilled) {
   close(connection);
 }
 
-TEST(VirtualDisplayTest, MissingXvfbIsSaidWithItsPackage) {
+TEST(VirtualDisplayTest, MissingXvfbNamesItsPackage) {
   const ScopedEnvironment no_display("DISPLAY", nullptr);
   const ScopedEnvironment no_programs("PATH", "/nonexistent");
   EXPECT_THAT(VirtualDisplay::Open(),

@@ -44,7 +44,7 @@ TEST_P(BadKeysTest, AreRefusedAtTheStartInOneLine) {
   EXPECT_FALSE(absl::StrContains(status.message(), "\n"));
 }
 
-TEST_P(BadKeysTest, LeaveTheOldOnesWhereTheyAreWhileTheServerRuns) {
+TEST_P(BadKeysTest, LeaveTheOldKeysInUseWhileTheServerRuns) {
   const TokenFiles files;
   ASSERT_OK_AND_ASSIGN(const auto authenticator, TokenAuthenticator::Start(files.Options()));
   Replace(files.keys(), GetParam().make());

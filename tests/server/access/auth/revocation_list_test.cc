@@ -60,7 +60,7 @@ struct BadList {
 
 class BadListTest : public ::testing::TestWithParam<BadList> {};
 
-TEST_P(BadListTest, IsRefusedAndSaysNothing) {
+TEST_P(BadListTest, IsRefusedWithoutLeakingItsContent) {
   EXPECT_THAT(RevocationList::Parse(GetParam().text),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(GetParam().error)));
   const TokenFiles files;

@@ -174,7 +174,7 @@ const std::vector<BadToken>& BadTokens() {
 
 class BadTokenTest : public ::testing::TestWithParam<BadToken> {};
 
-TEST_P(BadTokenTest, IsRefusedWithItsReasonAndNothingOfItself) {
+TEST_P(BadTokenTest, IsRefusedWithAReasonButNoneOfItsContent) {
   const TokenFiles files;
   const auto authenticator = StartWith(files.Options());
   const std::string token = GetParam().make();
@@ -202,7 +202,7 @@ std::string SentenceOf(const std::string& name, const Json& value) {
       Ask(authenticator.get(), WithClaims(With(GoodClaims(), name, value))).status().message());
 }
 
-TEST(RefusedTokenTest, TheErrorOfASignedTokenStatesWhatIsExpected) {
+TEST(RefusedTokenTest, ErrorOfASignedTokenStatesTheExpectedClaim) {
   EXPECT_THAT(SentenceOf("iss", "https://sts.example/1/"),
               HasSubstr("issuer is \"https://sts.example/1/\"; this server accepts only tokens of "
                         "\"https://login.example\""));
@@ -212,7 +212,7 @@ TEST(RefusedTokenTest, TheErrorOfASignedTokenStatesWhatIsExpected) {
   EXPECT_THAT(SentenceOf("aud", Json::array({"a", 1})), HasSubstr("audience is \"a, 1\", and"));
 }
 
-TEST(RefusedTokenTest, TheErrorStatesByHowMuchTheClocksDiffer) {
+TEST(RefusedTokenTest, ErrorStatesTheClockDifference) {
   const TokenFiles files;
   const auto now = std::chrono::system_clock::now();
   const auto at = [&](std::chrono::seconds later) {
@@ -236,7 +236,7 @@ TEST(RefusedTokenTest, TheErrorQuotesAClaimBoundedAndPrintable) {
   EXPECT_THAT(SentenceOf("aud", Json::array({std::string(5000, 'a')})).size(), ::testing::Lt(450));
 }
 
-TEST(RefusedTokenTest, NothingIsSaidOfATokenWhoseSignatureIsNotVerified) {
+TEST(RefusedTokenTest, ErrorRevealsNothingOfATokenWithABadSignature) {
   const TokenFiles files;
   const auto authenticator = StartWith(files.Options());
   const Json claims = With(GoodClaims(), "iss", "https://unverified.example");

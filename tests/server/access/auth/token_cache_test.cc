@@ -11,7 +11,7 @@
 namespace tissueform {
 namespace {
 
-TEST(TokenCacheTest, NeverHoldsMoreThanItMayAndForgetsTheOldest) {
+TEST(TokenCacheTest, RespectsItsLimitAndEvictsTheOldest) {
   TokenCache cache(3);
   for (int i = 0; i < 10; ++i) {
     cache.Insert(absl::StrCat(i), {.token_id = absl::StrCat(i)}, cache.generation());
@@ -21,14 +21,14 @@ TEST(TokenCacheTest, NeverHoldsMoreThanItMayAndForgetsTheOldest) {
   for (const char* digest : {"7", "8", "9"}) EXPECT_EQ(cache.Find(digest)->token_id, digest);
 }
 
-TEST(TokenCacheTest, WhatIsThereIsNotCountedTwice) {
+TEST(TokenCacheTest, InsertingATokenAgainDoesNotCountTwice) {
   TokenCache cache(2);
   cache.Insert("a", {}, cache.generation());
   for (int i = 0; i < 5; ++i) cache.Insert("b", {}, cache.generation());
   EXPECT_TRUE(cache.Find("a").has_value());
 }
 
-TEST(TokenCacheTest, WhatWasVerifiedWithOldKeysDoesNotComeBack) {
+TEST(TokenCacheTest, RejectsTokensVerifiedWithOldKeys) {
   TokenCache cache;
   const int64_t before = cache.generation();
   cache.Insert("a", {}, before);

@@ -43,7 +43,7 @@ TEST(TokenOptionsTest, AnIssuerForEveryTenantIsRefused) {
                                  "placeholder")));
 }
 
-TEST(TokenOptionsTest, WhatIsMissingIsNamed) {
+TEST(TokenOptionsTest, ErrorNamesTheMissingOption) {
   EXPECT_THAT(CheckTokenOptions({}),
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("--token-issuer")));
   TokenOptions options{.issuer = "a"};

@@ -81,7 +81,7 @@ class BackupTest : public ::testing::Test {
   std::unique_ptr<DurableStore> store_;
 };
 
-TEST_F(BackupTest, HoldsWhatWasAcknowledgedBeforeAndNotWhatCameAfter) {
+TEST_F(BackupTest, HoldsDataAcknowledgedBeforeItAndNoLaterData) {
   const absl::StatusOr<BackupSummary> summary = BackUp(data_, backup_);
   ASSERT_THAT(summary, IsOk());
   EXPECT_EQ(summary->schema_version, kSchemaVersion);
@@ -93,7 +93,7 @@ TEST_F(BackupTest, HoldsWhatWasAcknowledgedBeforeAndNotWhatCameAfter) {
   ExpectHolds(backup_, model_);
 }
 
-TEST_F(BackupTest, OfAServerThatIsNotRunningIsTheSame) {
+TEST_F(BackupTest, WorksForAStoppedServer) {
   store_.reset();
   ASSERT_THAT(BackUp(data_, backup_), IsOk());
   ExpectHolds(backup_, model_);
@@ -157,7 +157,7 @@ TEST_F(BackupTest, ReportsARowWithoutItsFileAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(backup_));
 }
 
-TEST_F(BackupTest, AFolderOfSomethingElseIsNoBackup) {
+TEST_F(BackupTest, RefusesToVerifyAFolderThatIsNotABackup) {
   EXPECT_THAT(VerifyBackup(::testing::TempDir()),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("not a backup")));
 }
@@ -169,7 +169,7 @@ TEST_F(BackupTest, ReportsADamagedFileAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(backup_));
 }
 
-TEST_F(BackupTest, NobodyElseMayReadIt) {
+TEST_F(BackupTest, IsAccessibleOnlyToItsOwner) {
   ASSERT_THAT(BackUp(data_, backup_), IsOk());
   for (const auto& entry : fs::recursive_directory_iterator(scratch_.path())) {
     if (entry.path().string().rfind(backup_, 0) != 0) continue;
@@ -180,20 +180,20 @@ TEST_F(BackupTest, NobodyElseMayReadIt) {
   }
 }
 
-TEST_F(BackupTest, AFolderThatHoldsSomethingIsNotTouched) {
+TEST_F(BackupTest, DoesNotTouchANonEmptyFolder) {
   fs::create_directory(backup_);
   fs::create_directory(backup_ + "/something");
   EXPECT_THAT(BackUp(data_, backup_), StatusIs(absl::StatusCode::kAlreadyExists));
   EXPECT_FALSE(fs::exists(backup_ + "/tissueform.db"));
 }
 
-TEST_F(BackupTest, WhereNothingIsKeptNothingIsMade) {
+TEST_F(BackupTest, CreatesNothingWithoutADataFolder) {
   EXPECT_THAT(BackUp(scratch_ / "nowhere", backup_), StatusIs(absl::StatusCode::kNotFound));
   EXPECT_FALSE(fs::exists(scratch_ / "nowhere"));
   EXPECT_FALSE(fs::exists(backup_));
 }
 
-TEST_F(BackupTest, OnAnotherDiskIsACopy) {
+TEST_F(BackupTest, CopiesToAnotherDisk) {
   const ScratchFolder other("/dev/shm");
   std::error_code error;
   fs::create_hard_link(data_ + "/lock", other / "probe", error);
@@ -203,14 +203,14 @@ TEST_F(BackupTest, OnAnotherDiskIsACopy) {
 }
 
 // A program that is not ours reads it.
-TEST_F(BackupTest, Sha256sumFindsItWhole) {
+TEST_F(BackupTest, PassesSha256sum) {
   ASSERT_THAT(BackUp(data_, backup_), IsOk());
   const std::string command = "cd " + backup_ + " && sha256sum --check --strict --quiet SHA256SUMS";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 
 // The way back from an upgrade: what was backed up before is, restored, what the older server left.
-TEST_F(BackupTest, OfAnOlderVersionKeepsItAndIsBroughtUpToDateByTheServerThatOpensIt) {
+TEST_F(BackupTest, KeepsAnOlderVersionUntilAServerUpgradesIt) {
   const std::string older = scratch_ / "older";
   fs::copy(testing::SourcePath("tests/data/store/version2"), older, fs::copy_options::recursive);
   fs::permissions(older, fs::perms::owner_all);

@@ -125,7 +125,7 @@ INSTANTIATE_TEST_SUITE_P(
                absl::StatusCode::kNotFound}),
     [](const auto& param) { return std::string(param.param.name); });
 
-TEST_F(DamagedBackup, AFolderThatHoldsSomethingIsNotRestoredInto) {
+TEST_F(DamagedBackup, DoesNotRestoreIntoANonEmptyFolder) {
   EXPECT_THAT(RestoreBackup(backup_, scratch_ / "data"),
               StatusIs(absl::StatusCode::kAlreadyExists, HasSubstr("empty folder")));
   fs::create_directory(target_);

@@ -75,7 +75,7 @@ TEST_F(AuditBufferTest, ReadsAfterANumberUpToACount) {
   EXPECT_THAT(Texts(buffer.get()), ElementsAre("three"));
 }
 
-TEST_F(AuditBufferTest, TakesWhatFitsAndNamesItsOption) {
+TEST_F(AuditBufferTest, AcceptsMessagesThatFitAndNamesTheSizeOption) {
   std::deque<std::string> messages = {std::string(60, 'a'), std::string(30, 'b'), "0123456789+"};
   auto buffer = Open(100);
   EXPECT_THAT(buffer->Append(&messages),
@@ -96,7 +96,7 @@ TEST_F(AuditBufferTest, OneProcessHoldsIt) {
               StatusIs(absl::StatusCode::kUnavailable, HasSubstr(path_)));
 }
 
-TEST_F(AuditBufferTest, IsItsOwnersAlone) {
+TEST_F(AuditBufferTest, IsAccessibleOnlyToItsOwner) {
   const auto buffer = Open();
   std::deque<std::string> messages = {"one"};
   EXPECT_THAT(buffer->Append(&messages), IsOk());
@@ -107,7 +107,7 @@ TEST_F(AuditBufferTest, IsItsOwnersAlone) {
   }
 }
 
-TEST_F(AuditBufferTest, NothingOfWhatWasRemovedIsLeftOnTheDisk) {
+TEST_F(AuditBufferTest, LeavesNoRemovedMessageOnTheDisk) {
   const auto buffer = Open();
   std::deque<std::string> messages = {"PLANTED-4711"};
   EXPECT_THAT(buffer->Append(&messages), IsOk());
@@ -124,7 +124,7 @@ TEST_F(AuditBufferTest, NothingOfWhatWasRemovedIsLeftOnTheDisk) {
   EXPECT_FALSE(found());
 }
 
-TEST_F(AuditBufferTest, AFileThatIsNoDatabaseIsRefusedByName) {
+TEST_F(AuditBufferTest, RefusesAFileThatIsNotADatabaseByName) {
   testing::WriteTestFile(path_, std::string(4096, 'x'));
   EXPECT_THAT(AuditBuffer::Open(path_, 1000).status().message(), HasSubstr(path_));
 }

@@ -43,7 +43,7 @@ class AuditLogTest : public ::testing::Test {
   std::optional<AuditLog> log_;
 };
 
-TEST_F(AuditLogTest, WhileTheSinkTakesNothingThereIsNoPlaceAndAfterwardsNothingIsMissing) {
+TEST_F(AuditLogTest, BlockedSinkRefusesReservationsAndLosesNothing) {
   Write("one");
   ASSERT_THAT(log_->Reserve(1), IsOk());
   ASSERT_TRUE(log_->Flush());

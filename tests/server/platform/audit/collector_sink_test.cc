@@ -172,7 +172,7 @@ TEST_F(CollectorSinkTest, ACollectorThatNeverReadsIsLeftAndTriedAgain) {
   EXPECT_TRUE(Eventually([&] { return IsEmptied(); }));
 }
 
-TEST_F(CollectorSinkTest, AFullBufferRefusesUntilTheCollectorTakesWhatItHolds) {
+TEST_F(CollectorSinkTest, FullBufferRefusesUntilTheCollectorDrainsIt) {
   StartCollector();
   collector_.reset();
   CollectorSink::Options options = Options();
@@ -190,7 +190,7 @@ TEST_F(CollectorSinkTest, AFullBufferRefusesUntilTheCollectorTakesWhatItHolds) {
   EXPECT_THAT(sink_->Take(&messages), IsOk());
 }
 
-TEST_F(CollectorSinkTest, WhatTheBufferHoldsIsSentAfterARestart) {
+TEST_F(CollectorSinkTest, SendsBufferedMessagesAfterARestart) {
   StartCollector();
   collector_.reset();
   StartSink();

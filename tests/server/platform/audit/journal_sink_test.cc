@@ -62,7 +62,7 @@ TEST_F(JournalSinkTest, WithoutAJournalItDoesNotOpen) {
               StatusIs(absl::StatusCode::kInvalidArgument));
 }
 
-TEST_F(JournalSinkTest, AJournalThatGoesIsAnErrorAndOneThatComesBackIsUsed) {
+TEST_F(JournalSinkTest, LostJournalIsAnErrorAndARestoredOneIsUsed) {
   std::optional<JournalSocket> journal(path_);
   const auto sink = Open();
   std::deque<std::string> messages = {"one"};

@@ -67,7 +67,7 @@ TEST(ReadUrl, RecognizesLoginsAndQueries) {
   EXPECT_TRUE(ReadUrl("https://a/b?c=d")->has_query);
 }
 
-TEST(EncodeForm, KeepsValuesApart) {
+TEST(EncodeForm, EscapesSeparatorsInValues) {
   EXPECT_EQ(EncodeForm({}), "");
   EXPECT_EQ(EncodeForm({{"a", "1&b=2"}, {"c", "ä"}, {"d", ""}}), "a=1%26b%3D2&c=%C3%A4&d=");
 }
@@ -105,7 +105,7 @@ TEST(SendHttp, FollowsNoRedirect) {
   server.Request();
 }
 
-TEST(SendHttp, SpeaksHttpAlone) {
+TEST(SendHttp, SupportsOnlyHttpUrls) {
   const auto answer = SendHttp({.url = "file:///etc/passwd", .max_body_bytes = 1 << 20});
   EXPECT_EQ(answer.status().code(), absl::StatusCode::kUnavailable);
 }

@@ -42,7 +42,7 @@ TEST(DataFolderTest, IsMadeForItsOwnerOnly) {
   EXPECT_EQ(ModeOf(folder.path() + "/lock"), 0600U);
 }
 
-TEST(DataFolderTest, OneThatOthersMayEnterIsRefused) {
+TEST(DataFolderTest, RefusesAFolderThatOthersMayEnter) {
   const ScratchFolder scratch;
   for (const mode_t mode : {0755, 0710, 0701}) {
     const std::string path = scratch / absl::StrCat("data", mode);

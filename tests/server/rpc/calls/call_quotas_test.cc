@@ -116,7 +116,7 @@ TEST_F(CallQuotasTest, ACallThatIsOverGivesItsPlaceBackOnce) {
   EXPECT_EQ(quotas_.open_streams("a"), 0);
 }
 
-TEST_F(CallQuotasTest, NobodyWhoIsAnonymousHasAQuota) {
+TEST_F(CallQuotasTest, AnonymousCallersHaveNoQuota) {
   AdmissionControl gate({.quotas = &quotas_});
   for (int i = 0; i < 100; ++i) {
     CallScope scope(nullptr, "Test.Call", CallKind::kMetadata, &gate);

@@ -67,7 +67,7 @@ TEST(CallScopeTest, AScopeThatIsLeftEndsItsCall) {
   EXPECT_TRUE(gate.WaitUntilIdle(at_once)) << "once, not twice";
 }
 
-TEST(CallScopeTest, EverybodyIsAnonymous) {
+TEST(CallScopeTest, CallerIsAnonymousWithoutLogins) {
   AdmissionControl gate;
   const CallScope scope(nullptr, "Test.Call", CallKind::kNewWork, &gate);
   EXPECT_TRUE(scope.principal().anonymous());
@@ -87,7 +87,7 @@ class TrustingAuthenticator : public Authenticator {
   }
 };
 
-TEST(CallScopeTest, AServerWithLoginsServesNobodyElse) {
+TEST(CallScopeTest, ServerWithLoginsRefusesUnauthenticatedCalls) {
   TrustingAuthenticator authenticator;
   AdmissionControl gate({.authenticator = &authenticator});
   EXPECT_EQ(AdmissionOf(CallKind::kMetadata, &gate), absl::StatusCode::kUnauthenticated);

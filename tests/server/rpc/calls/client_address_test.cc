@@ -88,23 +88,23 @@ class ClientAddressTest : public ::testing::Test, public v1::ServerInfoService::
   std::unique_ptr<grpc::Server> server_;
 };
 
-TEST_F(ClientAddressTest, TheGatewayStatesWhomItSpeaksFor) {
+TEST_F(ClientAddressTest, AcceptsTheClientAddressFromTheGateway) {
   EXPECT_EQ(AddressFor(gateway_, {"198.51.100.7"}), "198.51.100.7");
   EXPECT_EQ(AddressFor(gateway_, {"2001:DB8::7"}), "2001:db8::7");
 }
 
-TEST_F(ClientAddressTest, NobodyElseDoes) {
+TEST_F(ClientAddressTest, IgnoresTheClientAddressFromOthers) {
   EXPECT_EQ(AddressFor(workstation_, {"198.51.100.7"}), "127.0.0.1");
   EXPECT_EQ(AddressFor({}, {"198.51.100.7"}), "127.0.0.1");
 }
 
-TEST_F(ClientAddressTest, WhatIsNoAddressOrIsSaidTwiceDoesNotCount) {
+TEST_F(ClientAddressTest, IgnoresInvalidOrRepeatedAddresses) {
   EXPECT_EQ(AddressFor(gateway_, {"John Doe"}), "127.0.0.1");
   EXPECT_EQ(AddressFor(gateway_, {"198.51.100.7", "198.51.100.8"}), "127.0.0.1");
   EXPECT_EQ(AddressFor(gateway_, {}), "127.0.0.1");
 }
 
-TEST_F(ClientAddressTest, ACallWithoutANetworkHasNone) {
+TEST_F(ClientAddressTest, CallWithoutANetworkHasNoAddress) {
   EXPECT_EQ(ClientAddress(nullptr, {.certificate_names = {"gateway"}}, "gateway"), "");
 }
 

@@ -135,7 +135,7 @@ TEST_F(MessageStreamTest, AClientThatIsGoneEndsIt) {
   EXPECT_TRUE(Idle());
 }
 
-TEST_F(MessageStreamTest, AClientThatTakesNothingIsGivenUp) {
+TEST_F(MessageStreamTest, CancelsAClientThatReadsNothing) {
   LeavingClientCall call(&reactions_, 3, LeavingClientCall::Then::kTakesNothing);
   MessageStream<Message>* stream =
       NewStream([&call] { call.Cancel(); }, std::chrono::milliseconds(20));
@@ -151,7 +151,7 @@ TEST_F(MessageStreamTest, AClientThatTakesNothingIsGivenUp) {
 }
 
 // Every message has the whole time, and what was taken leaves no deadline behind.
-TEST_F(MessageStreamTest, AClientThatTakesItsMessagesIsNotGivenUp) {
+TEST_F(MessageStreamTest, DoesNotCancelAClientThatReads) {
   constexpr std::chrono::milliseconds kPatience{500};
   LeavingClientCall call(&reactions_, 100);
   MessageStream<Message>* stream = NewStream([&call] { call.Cancel(); }, kPatience);
@@ -186,7 +186,7 @@ TEST_F(MessageStreamTest, MessagesAreMadeWhereTheyArePosted) {
   EXPECT_EQ(posted, 5) << "the last finds none";
 }
 
-TEST_F(MessageStreamTest, AMessageThatCannotBeMadeIsItsEnd) {
+TEST_F(MessageStreamTest, EndsIfAMessageCannotBeMade) {
   LeavingClientCall call(&reactions_, 100);
   MessageStream<Message>* stream = NewStream();
   call.Bind(stream);
@@ -202,7 +202,7 @@ TEST_F(MessageStreamTest, AMessageThatCannotBeMadeIsItsEnd) {
   EXPECT_TRUE(Idle());
 }
 
-TEST_F(MessageStreamTest, AnErrorInPlaceOfMessagesIsItsEnd) {
+TEST_F(MessageStreamTest, EndsWithAnErrorInPlaceOfMessages) {
   LeavingClientCall call(&reactions_, 100);
   MessageStream<Message>* stream = NewStream();
   call.Bind(stream);

@@ -119,7 +119,7 @@ TEST(NodeHeaderTest, AServerOfAClusterSaysItsNameInEveryReply) {
   }
 }
 
-TEST(NodeHeaderTest, AServerAloneSaysNoNameAndReadsNone) {
+TEST(NodeHeaderTest, StandaloneServerIgnoresNodeNames) {
   const OneCallServer server({});
   const Reply reply = server.Call({"a:1"});
   EXPECT_TRUE(reply.status.ok()) << reply.status;

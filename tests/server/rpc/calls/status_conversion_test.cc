@@ -64,13 +64,13 @@ TEST(StatusConversionTest, ReportsTheRetryDelayAsGooglesRetryInfo) {
   EXPECT_EQ(retry.retry_delay().nanos(), 500'000'000);
 }
 
-TEST(StatusConversionTest, TheClientGetsBackWhatTheServerHad) {
+TEST(StatusConversionTest, StatusRoundTrips) {
   const absl::Status status =
       WithReason(absl::NotFoundError("no such mesh"), ErrorReason::kMeshNotFound, {{"a", "b=c"}});
   EXPECT_EQ(FromGrpcStatus(ToGrpcStatus(status)), status);  // payloads too
 }
 
-TEST(StatusConversionTest, PathsOfTheServerStayThere) {
+TEST(StatusConversionTest, OmitsPathsOfTheServer) {
   const absl::Status status = FileError(ENOSPC, "cannot write", "/srv/patients/tissueform.db-wal");
   EXPECT_THAT(std::string(status.message()), ::testing::HasSubstr("/srv/patients"));
   const grpc::Status sent = ToGrpcStatus(status);
@@ -79,7 +79,7 @@ TEST(StatusConversionTest, PathsOfTheServerStayThere) {
   EXPECT_THAT(sent.error_details(), ::testing::Not(::testing::HasSubstr("patients")));
 }
 
-TEST(StatusConversionTest, DetailsThatNobodyUnderstandsLeaveTheCodeAndTheMessage) {
+TEST(StatusConversionTest, UnknownDetailsKeepTheCodeAndTheMessage) {
   for (const char* details : {"", "\xff\xff", "\x1a\x02\x12\x00"}) {
     const absl::Status status =
         FromGrpcStatus({grpc::StatusCode::NOT_FOUND, "no such mesh", details});

@@ -61,7 +61,7 @@ class ChangeListenerTest : public ::testing::Test {
   std::unique_ptr<ChangeListener> listener_;
 };
 
-TEST_F(ChangeListenerTest, ReportsOnlyWhatOthersMustKnowAndInOrder) {
+TEST_F(ChangeListenerTest, ReportsOnlyRelevantChangesInOrder) {
   ASSERT_OK_AND_ASSIGN(const SessionRecord record,
                        CreateSession(stores_->sessions(), SampleSession("s", 1)));
   ASSERT_THAT(UpdateSession(stores_->sessions(), record), IsOk());

@@ -40,7 +40,7 @@ class LeaseKeeperTest : public ::testing::Test {
                       [this](const SessionLease& lease) { lost_.push_back(lease.session); }};
 };
 
-TEST_F(LeaseKeeperTest, WhatIsAcquiredMayBeAnsweredUntilShortlyBeforeItsLeaseEnds) {
+TEST_F(LeaseKeeperTest, AcquiredSessionIsUsableUntilShortlyBeforeItsLeaseEnds) {
   EXPECT_EQ(keeper_.EpochOf("s"), std::nullopt);
   ASSERT_OK_AND_ASSIGN(const LeaseAnswer answer, keeper_.Acquire("s"));
   EXPECT_TRUE(answer.mine);
@@ -51,14 +51,14 @@ TEST_F(LeaseKeeperTest, WhatIsAcquiredMayBeAnsweredUntilShortlyBeforeItsLeaseEnd
   EXPECT_EQ(keeper_.EpochOf("s"), std::nullopt) << "a second before";
 }
 
-TEST(LeaseClockTest, ItIsNeverBehindOneThatStandsStillWhileTheMachineSleeps) {
+TEST(LeaseClockTest, IsNeverBehindAClockThatPausesDuringSleep) {
   const auto before = std::chrono::steady_clock::now();
   const auto now = AwakeOrNotNow();
   EXPECT_GE(now, before);
   EXPECT_GE(AwakeOrNotNow(), now);
 }
 
-TEST_F(LeaseKeeperTest, WhatIsRenewedGoesOnUnderItsEpoch) {
+TEST_F(LeaseKeeperTest, RenewedSessionKeepsItsEpoch) {
   ASSERT_THAT(keeper_.Acquire("s"), IsOk());
   for (int i = 0; i < 5; ++i) {
     store_.now += seconds(3);
@@ -68,7 +68,7 @@ TEST_F(LeaseKeeperTest, WhatIsRenewedGoesOnUnderItsEpoch) {
   EXPECT_THAT(lost_, IsEmpty());
 }
 
-TEST_F(LeaseKeeperTest, WhatAnotherHasTakenOverIsLostOnce) {
+TEST_F(LeaseKeeperTest, ReportsATakenOverSessionAsLostOnce) {
   ASSERT_THAT(keeper_.Acquire("s"), IsOk());
   ASSERT_THAT(keeper_.Acquire("t"), IsOk());
   store_.now += seconds(11);
@@ -83,7 +83,7 @@ TEST_F(LeaseKeeperTest, WhatAnotherHasTakenOverIsLostOnce) {
   EXPECT_EQ(answer.node, "B");
 }
 
-TEST_F(LeaseKeeperTest, AStoreThatIsNotThereCostsTheSessionWhenItsTimeIsOverAndNotBefore) {
+TEST_F(LeaseKeeperTest, UnavailableStoreCostsASessionOnlyAfterItsLease) {
   ASSERT_THAT(keeper_.Acquire("s"), IsOk());
   store_.failure = absl::UnavailableError("gone");
   store_.now += seconds(6);
@@ -95,7 +95,7 @@ TEST_F(LeaseKeeperTest, AStoreThatIsNotThereCostsTheSessionWhenItsTimeIsOverAndN
   EXPECT_THAT(lost_, ElementsAre("s"));
 }
 
-TEST_F(LeaseKeeperTest, WhoStoodStillBeyondItsLeaseAnswersNothingThoughNobodyTookIt) {
+TEST_F(LeaseKeeperTest, DoesNotAnswerAfterAnExpiredLeaseEvenIfUntaken) {
   ASSERT_THAT(keeper_.Acquire("s"), IsOk());
   store_.now += seconds(60);
   EXPECT_EQ(keeper_.EpochOf("s"), std::nullopt);
@@ -105,7 +105,7 @@ TEST_F(LeaseKeeperTest, WhoStoodStillBeyondItsLeaseAnswersNothingThoughNobodyToo
   EXPECT_EQ(keeper_.EpochOf("s"), 4);
 }
 
-TEST_F(LeaseKeeperTest, WhileTheStoreIsSilentNobodyWaitsForItAgain) {
+TEST_F(LeaseKeeperTest, FailsFastWhileTheStoreIsUnavailable) {
   class Counted final : public SessionLeases {
    public:
     explicit Counted(SessionLeases* leases) : leases_(*leases) {}
@@ -150,7 +150,7 @@ TEST_F(LeaseKeeperTest, WhileTheStoreIsSilentNobodyWaitsForItAgain) {
   EXPECT_THAT(keeper.Acquire("u"), StatusIs(absl::StatusCode::kNotFound)) << "it answers again";
 }
 
-TEST_F(LeaseKeeperTest, WhatWasPassedOverIsRenewedSoon) {
+TEST_F(LeaseKeeperTest, RenewsASkippedSessionSoon) {
   class Writing final : public SessionLeases {
    public:
     explicit Writing(SessionLeases* leases) : leases_(*leases) {}
@@ -186,7 +186,7 @@ TEST_F(LeaseKeeperTest, WhatWasPassedOverIsRenewedSoon) {
   EXPECT_EQ(keeper.EpochOf("s"), 3);
 }
 
-TEST_F(LeaseKeeperTest, WhatIsReleasedIsAnothersAtOnce) {
+TEST_F(LeaseKeeperTest, OthersMayTakeAReleasedSessionAtOnce) {
   ASSERT_THAT(keeper_.Acquire("s"), IsOk());
   ASSERT_THAT(keeper_.Acquire("t"), IsOk());
   ASSERT_THAT(keeper_.ReleaseAll(), IsOk());
@@ -269,12 +269,12 @@ void CheckAllOrders(const LeaseSteps& all, size_t depth, LeaseSteps* steps) {
   }
 }
 
-TEST(LeaseOrdersTest, InNoOrderOfSixStepsDoTwoServersAnswerOrWriteUnderOneEpoch) {
+TEST(LeaseOrdersTest, NoOrderOfSixStepsLetsTwoServersShareAnEpoch) {
   LeaseSteps steps;
   CheckAllOrders(PromptLeaseSteps(), 6, &steps);
 }
 
-TEST(LeaseOrdersTest, NorInOneOfFourStepsWhenTimePassesBeforeOrAfterTheStoreDoesThem) {
+TEST(LeaseOrdersTest, NoOrderOfFourDelayedStepsLetsTwoServersShareAnEpoch) {
   LeaseSteps steps;
   CheckAllOrders(AllLeaseSteps(), 4, &steps);
 }

@@ -45,7 +45,7 @@ class MigrateStoreTest : public ::testing::Test {
   std::unique_ptr<PostgresStores> to_;
 };
 
-TEST_F(MigrateStoreTest, WhatOneServerHasKeptIsThereAsItWas) {
+TEST_F(MigrateStoreTest, CopiesAllDataUnchanged) {
   constexpr int kSessions = 103;  // more than a page
   for (int i = 0; i < kSessions; ++i) {
     ASSERT_THAT(CreateSession(from_->sessions(), SampleSession(absl::StrCat("s", i), i), 3),

@@ -47,7 +47,7 @@ TEST(PostgresOptionsTest, LocksOfAStoppedServerAreFreeBeforeItsLeasesEnd) {
             LeaseOptions().duration - LeaseKeeper::Options().renew_every);
 }
 
-TEST(PostgresOptionsTest, AHostElsewhereIsAskedForItsCertificateUnlessTheUrlSaysOtherwise) {
+TEST(PostgresOptionsTest, VerifiesRemoteHostsUnlessTheUrlSaysOtherwise) {
   ASSERT_OK_AND_ASSIGN(PostgresTarget target, TargetOf(Url("postgresql://db.example/faces")));
   EXPECT_THAT(target.connection, HasSubstr("sslmode='verify-full'"));
   ASSERT_OK_AND_ASSIGN(target, TargetOf(Url("postgresql://localhost,db.example/faces")));
@@ -77,7 +77,7 @@ TEST(PostgresOptionsTest, RefusesInvalidUrlsWithoutRepeatingThem) {
   EXPECT_THAT(TargetOf(options), StatusIs(Code::kInvalidArgument, HasSubstr("at least 1")));
 }
 
-TEST(PostgresOptionsTest, APasswordStandsInAFileThatNotEverybodyReadsOrInTheEnvironment) {
+TEST(PostgresOptionsTest, PasswordComesFromAPrivateFileOrTheEnvironment) {
   const ScratchFolder folder;
   const std::string path = folder / "password";
   std::ofstream(path) << "hush\n";

@@ -51,7 +51,7 @@ class PostgresPoolTest : public ::testing::Test {
   std::unique_ptr<PostgresStores> stores_;
 };
 
-TEST_F(PostgresPoolTest, AConnectionThroughWhichNothingComesIsGivenUpAndTheCallGoesOnOnAnother) {
+TEST_F(PostgresPoolTest, ReplacesAStalledConnectionAndContinuesTheCall) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.unanswered_timeout = std::chrono::milliseconds(300);
@@ -65,7 +65,7 @@ TEST_F(PostgresPoolTest, AConnectionThroughWhichNothingComesIsGivenUpAndTheCallG
   EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(7)));
 }
 
-TEST_F(PostgresPoolTest, OfConnectionsThatFrozeTogetherACallWaitsForOneOnly) {
+TEST_F(PostgresPoolTest, CallWaitsForOnlyOneOfSeveralFrozenConnections) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.unanswered_timeout = std::chrono::milliseconds(1'500);
@@ -85,7 +85,7 @@ TEST_F(PostgresPoolTest, OfConnectionsThatFrozeTogetherACallWaitsForOneOnly) {
   EXPECT_EQ(proxy.accepted(), before + 1);
 }
 
-TEST_F(PostgresPoolTest, NobodyWaitsBeyondTheEndOfWaiting) {
+TEST_F(PostgresPoolTest, EndingWaitsReleasesAllWaiters) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.patience = std::chrono::minutes(10);
@@ -142,7 +142,7 @@ TEST_F(PostgresPoolTest, EarlierWaitsCountTowardsPatienceWhileTheDatabaseIsAway)
   EXPECT_THAT(pool->Run(select), IsOk());
 }
 
-TEST_F(PostgresPoolTest, OfACommitThatIsNotAnsweredNobodyClaimsToKnow) {
+TEST_F(PostgresPoolTest, UnansweredCommitIsReportedAsPossiblySuccessful) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.unanswered_timeout = std::chrono::milliseconds(300);
@@ -216,7 +216,7 @@ TEST_F(PostgresPoolTest, RetriesIdempotentWorkWhenItsCommitIsNotAnswered) {
       1);
 }
 
-TEST_F(PostgresPoolTest, AConnectionThatFreezesWhileNothingIsToBeKeptCostsNoPlace) {
+TEST_F(PostgresPoolTest, FrozenConnectionWithoutPendingWorkFreesItsPlace) {
   FrozenProxy proxy(TestDatabasePort());
   PostgresOptions options = Through(proxy);
   options.unanswered_timeout = std::chrono::milliseconds(300);
@@ -233,7 +233,7 @@ TEST_F(PostgresPoolTest, AConnectionThatFreezesWhileNothingIsToBeKeptCostsNoPlac
       IsOk());
 }
 
-TEST_F(PostgresPoolTest, ADatabaseThatAcceptsAndSaysNothingKeepsNoServerFromBeingRefused) {
+TEST_F(PostgresPoolTest, OpenFailsIfTheDatabaseAcceptsButNeverAnswers) {
   FrozenProxy proxy(TestDatabasePort());
   proxy.FreezeWhenReady();
   PostgresOptions options = Through(proxy);
@@ -296,7 +296,7 @@ TEST_F(PostgresPoolTest, EndsStatementsThatAreLockedOrTakeTooLong) {
               IsOk());
 }
 
-TEST_F(PostgresPoolTest, NothingOfAWorkThatFailsIsKept) {
+TEST_F(PostgresPoolTest, FailedWorkIsRolledBack) {
   EXPECT_THAT(stores_->pool()->Run([](PostgresTransaction& transaction) {
     EXPECT_THAT(transaction.Execute("INSERT INTO blobs (sha256, bytes) VALUES ('x', 1)"), IsOk());
     return absl::CancelledError("no");

@@ -199,7 +199,7 @@ TEST_F(PostgresStoresTest, ADamagedRecordIsReportedAndLeftOutOfLists) {
       << "a row of another's record is nobody's";
 }
 
-TEST_F(PostgresStoresTest, NamesThatAreNoTextAreRefusedAndOddOnesKept) {
+TEST_F(PostgresStoresTest, RefusesNamesThatAreNotUtf8AndKeepsUnusualOnes) {
   EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession(std::string("a\0b", 3), 1)),
               StatusIs(Code::kInvalidArgument, HasSubstr("UTF-8")));
   EXPECT_THAT(CreateSession(stores_->sessions(), SampleSession("a\xff", 1)),
@@ -256,7 +256,7 @@ TEST_F(PostgresStoresTest, RowsFromBeforeThereWereIndexColumnsAreFoundByThem) {
   EXPECT_EQ(found->mesh_sha256, SampleSession("s", 1).mesh_sha256);
 }
 
-TEST_F(PostgresStoresTest, TablesOfTheVersionBeforeAreBroughtUpToDateWithWhatTheyHold) {
+TEST_F(PostgresStoresTest, UpgradesTablesOfThePreviousVersionWithTheirData) {
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), 7), IsOk());
   const std::string mesh = PutMesh(1);
   stores_.reset();
@@ -291,7 +291,7 @@ TEST_F(PostgresStoresTest, ADatabaseThatIsNotThereIsUnavailable) {
               StatusIs(Code::kUnavailable, HasSubstr("postgresql://127.0.0.1:1/postgres")));
 }
 
-TEST_F(PostgresStoresTest, ADatabaseThatTakesNoWritesIsRefusedAtTheStartAndWaitedForByCalls) {
+TEST_F(PostgresStoresTest, ReadOnlyDatabaseIsRefusedAtStartAndAwaitedByCalls) {
   MakeAway();
   const auto hasty = OpenAway(std::chrono::milliseconds(150));
   const auto patient = OpenAway(std::chrono::seconds(30));
@@ -320,7 +320,7 @@ TEST_F(PostgresStoresTest, CallsGoOnWhenTheDatabaseHasEndedTheirConnections) {
   }
 }
 
-TEST_F(PostgresStoresTest, ACallWaitsForADatabaseThatComesBackAndNotForever) {
+TEST_F(PostgresStoresTest, CallWaitsALimitedTimeForTheDatabaseToReturn) {
   MakeAway();
   const auto hasty = OpenAway(std::chrono::milliseconds(150));
   const auto patient = OpenAway(std::chrono::seconds(30));
@@ -338,7 +338,7 @@ TEST_F(PostgresStoresTest, ACallWaitsForADatabaseThatComesBackAndNotForever) {
   EXPECT_EQ(SerializePoses(found.last_poses), SerializePoses(SamplePoses(5)));
 }
 
-TEST_F(PostgresStoresTest, ADatabaseWithoutTlsIsNotTalkedToWhereTlsIsAskedFor) {
+TEST_F(PostgresStoresTest, RefusesADatabaseWithoutTlsIfTlsIsRequired) {
   PostgresOptions options = TestDatabaseOptions();
   absl::StrAppend(&options.url, "?sslmode=verify-full&sslrootcert=/nowhere.pem");
   EXPECT_THAT(PostgresStores::Open({.database = options}).status(),

@@ -102,7 +102,7 @@ TEST_F(PostgresTlsTest, ACertificateOfAnotherHostIsRefused) {
                                AnyOf(HasSubstr("host name"), HasSubstr("elsewhere.example"))));
 }
 
-TEST_F(PostgresTlsTest, ADatabaseWithoutTlsIsNotTalkedTo) {
+TEST_F(PostgresTlsTest, RefusesADatabaseWithoutTls) {
   RunOutsideTransaction("ALTER SYSTEM SET ssl = off");
   Reload();
   absl::Status status;

@@ -117,7 +117,7 @@ std::pair<std::string, std::string> ModelAfter(const LeaseSteps& steps) {
   return {seen, absl::StrCat(row, " ", servers.Knowledge(world.Now()))};
 }
 
-TEST_F(PostgresLeasesTest, FromEveryStateThatThereIsTheDatabaseTakesEveryStepAsTheModelDoes) {
+TEST_F(PostgresLeasesTest, MatchesTheModelForEveryStepFromEveryState) {
   std::set<std::string> known = {ModelAfter({}).second};
   std::deque<LeaseSteps> open = {{}};
   int number = 0;
@@ -141,7 +141,7 @@ TEST_F(PostgresLeasesTest, FromEveryStateThatThereIsTheDatabaseTakesEveryStepAsT
   RecordProperty("orders", number);
 }
 
-TEST_F(PostgresLeasesTest, OfServersThatTakeASessionOverAtOnceOneGetsIt) {
+TEST_F(PostgresLeasesTest, OneOfSeveralConcurrentTakeoversSucceeds) {
   ASSERT_OK_AND_ASSIGN(const SessionRecord made,
                        CreateSession(stores_->sessions(), SampleSession("s", 1), kFreshEpoch));
   int64_t newest = made.epoch;
@@ -169,7 +169,7 @@ TEST_F(PostgresLeasesTest, OfServersThatTakeASessionOverAtOnceOneGetsIt) {
   }
 }
 
-TEST_F(PostgresLeasesTest, WhoHasLostASessionWritesNothingOfItAnyMore) {
+TEST_F(PostgresLeasesTest, FormerOwnerCannotWriteALostSession) {
   ASSERT_OK_AND_ASSIGN(SessionRecord record,
                        CreateSession(stores_->sessions(), SampleSession("s", 1)));
   PostgresSessionLeases old_owner(stores_->pool(), "A");
@@ -191,7 +191,7 @@ TEST_F(PostgresLeasesTest, WhoHasLostASessionWritesNothingOfItAnyMore) {
   EXPECT_EQ(record.epoch, second.lease.epoch);
 }
 
-TEST_F(PostgresLeasesTest, WhoStandsStillBetweenAWriteAndItsCommitKeepsNobodyFromTakingTheSession) {
+TEST_F(PostgresLeasesTest, StalledCommitDoesNotBlockATakeover) {
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), kFreshEpoch), IsOk());
   PostgresOptions options = TestDatabaseOptions();
   options.idle_timeout = milliseconds(50);
@@ -219,7 +219,7 @@ TEST_F(PostgresLeasesTest, WhoStandsStillBetweenAWriteAndItsCommitKeepsNobodyFro
   EXPECT_EQ(SerializePoses(kept.last_poses), SerializePoses(SamplePoses(1)));
 }
 
-TEST_F(PostgresLeasesTest, WhoHeldASessionWritesNothingOfTheNextOneOfItsName) {
+TEST_F(PostgresLeasesTest, FormerOwnerCannotWriteANewSessionOfTheSameName) {
   ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession("s", 1), kFreshEpoch), IsOk());
   PostgresSessionLeases old_owner(stores_->pool(), "A");
   ASSERT_OK_AND_ASSIGN(const LeaseAnswer before, old_owner.Acquire("s"));
@@ -243,7 +243,7 @@ TEST_F(PostgresLeasesTest, WhoHeldASessionWritesNothingOfTheNextOneOfItsName) {
   EXPECT_EQ(still.lease.epoch, after.lease.epoch);
 }
 
-TEST_F(PostgresLeasesTest, ASessionThatOthersWriteCostsTheLeasesOfNoOther) {
+TEST_F(PostgresLeasesTest, LockedSessionDoesNotCostOtherLeases) {
   for (const char* session : {"s", "t"}) {
     ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession(session, 1), kFreshEpoch), IsOk());
   }
@@ -305,7 +305,7 @@ TEST_F(PostgresLeasesTest, AnUnknownSessionIsNotFound) {
   EXPECT_TRUE(renewed.empty());
 }
 
-TEST_F(PostgresLeasesTest, WhereTheDatabasesClockIsSetBackTheDeadKeepNothingAndTheLivingAll) {
+TEST_F(PostgresLeasesTest, ClockSetBackKeepsRenewedLeasesAndExpiresDeadOnes) {
   for (const char* session : {"dead", "alive"}) {
     ASSERT_THAT(CreateSession(stores_->sessions(), SampleSession(session, 1), kFreshEpoch), IsOk());
   }
@@ -342,7 +342,7 @@ TEST_F(PostgresLeasesTest, WhereTheDatabasesClockIsSetBackTheDeadKeepNothingAndT
   EXPECT_THAT(left, ::testing::IsEmpty());
 }
 
-TEST_F(PostgresLeasesTest, TheClockOfLeasesIsTheDatabases) {
+TEST_F(PostgresLeasesTest, LeasesUseTheDatabaseClock) {
   RunSql(
       "CREATE OR REPLACE FUNCTION tissueform_now() RETURNS timestamptz VOLATILE LANGUAGE sql AS "
       "'SELECT clock_timestamp()';");
