@@ -33,7 +33,9 @@ TriangleMesh Octahedron(const std::vector<int>& left_out) {
   return *TriangleMesh::Create(std::move(positions), std::move(triangles));
 }
 
-TEST(BorderLoopsTest, ClosedSurfaceHasNoBorderLoops) { EXPECT_TRUE(BorderLoops(Octahedron({})).empty()); }
+TEST(BorderLoopsTest, ClosedSurfaceHasNoBorderLoops) {
+  EXPECT_TRUE(BorderLoops(Octahedron({})).empty());
+}
 
 TEST(BorderLoopsTest, FindsAnOpeningAndItsWidth) {
   const TriangleMesh mesh = Octahedron({0});

@@ -8,9 +8,7 @@
 namespace tissueform {
 namespace {
 
-TEST(StatsJsonTest, ConvergedAnswerHasNoNotReachedText) {
-  EXPECT_EQ(NotReachedText({}), "");
-}
+TEST(StatsJsonTest, ConvergedAnswerHasNoNotReachedText) { EXPECT_EQ(NotReachedText({}), ""); }
 
 TEST(StatsJsonTest, UnreachedMovementNamesTheObstacle) {
   SolveSummary solve;

@@ -27,8 +27,7 @@ int ExitCodeOfAsking(const char* chosen_kernels) {
       unsetenv("OPENBLAS_CORETYPE");
     }
     std::string program = "blas_threads_test";
-    std::string filter =
-        "--gtest_filter=BlasThreadsTest.ProgramRestartsOnlyIfItsKernelsDoNotFit";
+    std::string filter = "--gtest_filter=BlasThreadsTest.ProgramRestartsOnlyIfItsKernelsDoNotFit";
     std::array<char*, 3> argv = {program.data(), filter.data(), nullptr};
     RestartWithFittingBlasKernels(argv.data());
     _exit(7);  // it has returned
