@@ -38,7 +38,7 @@ constexpr double kSameSkinMm = 0.05;
 constexpr double kMaxOpeningDeg = 10;
 // Of a segment and the post-operative bone. Right ones leave 0.05 to 0.2 mm, one that was not
 // scanned 1.2 to 3 mm.
-constexpr double kMaxFitMm = 0.8;
+constexpr double kMaxFitMm = 1;
 // Of a region; less is said.
 constexpr double kWellSeenShare = 0.9;
 // Both cheeks stand out by so much more than predicted: more than models err there.
