@@ -52,7 +52,7 @@ PostOperativeHead OperatedHead(const PreOperativeHead& pre, const std::vector<Ha
 void ExpectMovements(const Outcome& outcome, const std::vector<HandlePose>& real);
 
 // Expects of the first prediction, by region, the distances that its face has from the true skin
-// (which lies in the pre-operative coordinates), to 0.1 mm.
+// (in pre-operative coordinates), to 0.1 mm.
 void ExpectErrorsByRegion(const Outcome& outcome, const TriangleMesh& true_skin);
 
 }  // namespace tissueform::testing
