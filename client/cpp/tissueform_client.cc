@@ -243,10 +243,16 @@ absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
     *request.add_poses() = ToProto(pose);
   }
   *request.mutable_vertices() = ToProto(vertices);
+  return DeformOnce(request);
+}
+
+absl::StatusOr<v1::DeformOnceResponse> TissueformClient::DeformOnce(
+    const v1::DeformOnceRequest& request) {
   v1::DeformOnceResponse response;
-  TF_RETURN_IF_ERROR(Call(session, CallRepeat::kAlways, [&](grpc::ClientContext* context) {
-    return deform_->DeformOnce(context, request, &response);
-  }));
+  TF_RETURN_IF_ERROR(
+      Call(request.session(), CallRepeat::kAlways, [&](grpc::ClientContext* context) {
+        return deform_->DeformOnce(context, request, &response);
+      }));
   return response;
 }
 

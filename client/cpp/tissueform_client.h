@@ -111,6 +111,8 @@ class TissueformClient {
       const AnswerVertices& vertices = {},
       v1::DeformationModel model = v1::DEFORMATION_MODEL_UNSPECIFIED,
       v1::PositionEncoding encoding = v1::POSITION_ENCODING_FLOAT32);
+  // For what the parameters above leave out: ranges of the material.
+  absl::StatusOr<v1::DeformOnceResponse> DeformOnce(const v1::DeformOnceRequest& request);
 
   // The stream has no deadline. No `patience`: for who tries again himself.
   absl::StatusOr<std::unique_ptr<DeformStream>> OpenStream(

@@ -30,10 +30,12 @@ const PARTS = {
   planner_slices: 16 * KIB,
   report_file: 16 * KIB,
   report_sheet: 16 * KIB,
+  resting_band: KIB,
   side_by_side_page: 16 * KIB,
   skin_points: 2 * KIB,
   slice_views: 16 * KIB,
   sticking_case: 4 * KIB,
+  touch_part: 2 * KIB,
   volume_worker: 80 * KIB,
   whole_band: 16 * KIB,
 };

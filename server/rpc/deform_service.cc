@@ -5,15 +5,20 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "core/base/status_macros.h"
 #include "core/mechanics/deformation/deformation_quality.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/material_conversion.h"
+#include "proto/conversion/model_conversion.h"
 #include "server/rpc/allowed_resource.h"
 #include "server/rpc/deform_stream.h"
 #include "server/rpc/prepared_answers_stream.h"
+#include "server/rpc/resource_conversion.h"
 #include "server/rpc/single_answer.h"
 #include "server/rpc/watch_stream.h"
 
@@ -53,14 +58,22 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
     }
     FindSingleAnswer(
         registry_, {request_.session(), request_.poses(), request_.model()}, cancelled_,
-        [this](const Session& session) { return ChooseVertices(session); },
+        [this](const Session& session) { return ReadFor(session); },
         [this](const absl::StatusOr<SingleAnswer>& answer) {
           if (answer.ok()) Describe(*answer);
-          End(answer.status());
+          if (answer.ok() && ranges_) {
+            PostBand(*answer);
+          } else {
+            End(answer.status());
+          }
         });
   }
 
-  absl::Status ChooseVertices(const Session& session) {
+  absl::Status ReadFor(const Session& session) {
+    if (request_.has_ranges()) {
+      TF_ASSIGN_OR_RETURN(const DeformationModel model, ToModel(request_.model(), session.model()));
+      TF_ASSIGN_OR_RETURN(ranges_, ToElasticRanges(request_.ranges(), session, model));
+    }
     TF_ASSIGN_OR_RETURN(choice_,
                         ToVertexChoice(request_.vertices(), session.mesh().mesh.num_vertices(),
                                        session.mesh().skin));
@@ -78,6 +91,33 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
     response_.set_step_mm(encoded.step_mm);
   }
 
+  void PostBand(const SingleAnswer& answer) {
+    answer.session->making_strand().Post(Lane::kBatch,
+                                         [this, answer] { End(DescribeBand(answer)); });
+  }
+
+  // On making_strand(). The answer is good without its band.
+  absl::Status DescribeBand(const SingleAnswer& answer) {
+    const std::optional<SealAnswer>& seal = answer.deformation.seal;
+    if (seal && !seal->released) {
+      response_.set_no_uncertainty(
+          "the material's part of the interval is not known of sealed lips");
+      return absl::OkStatus();
+    }
+    const Cancellation cancellation([this] { return cancelled_->load(); });
+    const absl::StatusOr<Eigen::VectorXf> band = answer.session->FindMaterialBand(
+        answer.model, *ranges_, answer.poses, answer.deformation.positions, cancellation);
+    if (cancellation.requested() || absl::IsNotFound(band.status())) return band.status();
+    TF_RETURN_IF_ERROR(answer.session->CheckHeld());
+    if (band.ok()) {
+      response_.set_uncertainty_p95_mm(
+          FloatBytes(choice_.all ? *band : Eigen::VectorXf((*band)(choice_.vertices))));
+    } else {
+      response_.set_no_uncertainty(std::string(band.status().message()));
+    }
+    return absl::OkStatus();
+  }
+
   void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }
 
   CallScope scope_;
@@ -86,6 +126,7 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
   v1::DeformOnceResponse& response_;
   const std::shared_ptr<std::atomic<bool>> cancelled_ = std::make_shared<std::atomic<bool>>(false);
   VertexChoice choice_;
+  std::optional<MaterialUncertainty> ranges_;
 };
 
 }  // namespace

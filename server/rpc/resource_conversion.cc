@@ -11,6 +11,7 @@
 #include "core/base/status_macros.h"
 #include "proto/conversion/answer_conversion.h"
 #include "proto/conversion/geometry_conversion.h"
+#include "proto/conversion/material_conversion.h"
 #include "proto/conversion/mesh_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/session_conversion.h"
@@ -148,6 +149,19 @@ absl::StatusOr<PageRequest> ReadPageRequest(int32_t page_size, const std::string
   }
   return PageRequest{.size = page_size == 0 ? kPageSize : std::min(page_size, kMaxPageSize),
                      .after = page_token};
+}
+
+absl::StatusOr<MaterialUncertainty> ToElasticRanges(const v1::MaterialRanges& ranges,
+                                                    const Session& session,
+                                                    DeformationModel model) {
+  TF_ASSIGN_OR_RETURN(
+      MaterialUncertainty uncertainty,
+      ToMaterialUncertainty(ranges, session.mesh().mesh.num_tets(), session.poisson_ratio()));
+  if (!TraitsOf(model).is_elastic) {
+    return absl::InvalidArgumentError(
+        "ranges need linear_elastic or neo_hookean; choose one of them, or leave them out");
+  }
+  return uncertainty;
 }
 
 v1::Session ToProto(const SessionView& view) {

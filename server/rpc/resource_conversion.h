@@ -8,12 +8,16 @@
 
 #include "absl/status/statusor.h"
 
+#include "core/mechanics/deformation/model.h"
+#include "core/mechanics/uncertainty/material_uncertainty.h"
 #include "server/access/auth/identity.h"
 #include "server/session/limits.h"
 #include "server/session/mesh_catalog.h"
+#include "server/session/session.h"
 #include "server/session/session_registry.h"
 #include "server/store/session_record.h"
 #include "server/store/upload_store.h"
+#include "tissueform/v1/deform_service.pb.h"
 #include "tissueform/v1/mesh.pb.h"
 #include "tissueform/v1/mesh_service.pb.h"
 #include "tissueform/v1/session.pb.h"
@@ -36,6 +40,10 @@ absl::StatusOr<SessionRecord> ToUpdatedRecord(const v1::UpdateSessionRequest& re
                                               SessionRecord record, const StoredMesh& mesh,
                                               const ServiceLimits& limits);
 v1::Session ToProto(const SessionView& view);
+
+// For answers of `model`. Errors: those of ToMaterialUncertainty; InvalidArgument (not elastic).
+absl::StatusOr<MaterialUncertainty> ToElasticRanges(const v1::MaterialRanges& ranges,
+                                                    const Session& session, DeformationModel model);
 
 // Which part of a list is asked for.
 struct PageRequest {

@@ -16,6 +16,7 @@
 #include "proto/conversion/material_conversion.h"
 #include "proto/conversion/model_conversion.h"
 #include "proto/conversion/session_conversion.h"
+#include "server/rpc/resource_conversion.h"
 
 namespace tissueform {
 namespace {
@@ -43,15 +44,8 @@ absl::StatusOr<ResponseRequest> ReadResponse(const v1::PreparedAnswers& settings
   request.vertices = configuration.choice.vertices;
   TF_RETURN_IF_ERROR(ReadPrepared(settings, &request));
   if (settings.has_ranges()) {
-    const Session& session = *configuration.session;
-    TF_ASSIGN_OR_RETURN(request.ranges,
-                        ToMaterialUncertainty(settings.ranges(), session.mesh().mesh.num_tets(),
-                                              session.poisson_ratio()));
-    if (!TraitsOf(configuration.model).is_elastic) {
-      return absl::InvalidArgumentError(
-          "prepared.ranges need linear_elastic or neo_hookean; choose one of them, or leave "
-          "them out");
-    }
+    TF_ASSIGN_OR_RETURN(request.ranges, ToElasticRanges(settings.ranges(), *configuration.session,
+                                                        configuration.model));
   }
   if (configuration.choice.all) {
     request.vertices.resize(configuration.session->mesh().mesh.num_vertices());

@@ -191,6 +191,19 @@ absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> Session::PrepareResponse(
   return claim;
 }
 
+absl::StatusOr<Eigen::VectorXf> Session::FindMaterialBand(DeformationModel model,
+                                                          const MaterialUncertainty& uncertainty,
+                                                          absl::Span<const HandlePose> poses,
+                                                          const Positions& deformed,
+                                                          const Cancellation& cancellation) {
+  TF_ASSIGN_OR_RETURN(const std::shared_ptr<SharedPreparation> preparation, OpenPreparation());
+  making_ = true;
+  absl::StatusOr<Eigen::VectorXf> band =
+      preparation->FindMaterialBand(model, uncertainty, poses, deformed, cancellation);
+  making_ = false;
+  return band;
+}
+
 std::shared_ptr<const ProgressFeed::Follower> Session::Follow(
     const ResponseRequest& request, SessionProgressCallback on_progress) const {
   const absl::StatusOr<std::shared_ptr<SharedPreparation>> preparation = OpenPreparation();

@@ -129,6 +129,12 @@ class Session {
   absl::Status PrepareModel(DeformationModel model, const Cancellation& cancellation);
   absl::StatusOr<std::shared_ptr<PreparedAnswersRef>> PrepareResponse(
       const ResponseRequest& request, const Cancellation& cancellation);
+  // On making_strand(). SharedPreparation::FindMaterialBand. Errors: those and NotFound.
+  absl::StatusOr<Eigen::VectorXf> FindMaterialBand(DeformationModel model,
+                                                   const MaterialUncertainty& uncertainty,
+                                                   absl::Span<const HandlePose> poses,
+                                                   const Positions& deformed,
+                                                   const Cancellation& cancellation);
 
   // On the strand. `poses` has one entry per handle, in the order of the constraints.
   //
@@ -166,7 +172,7 @@ class Session {
     updated_ = true;
     if (other_handles) outdated_ = true;
   }
-  // Any thread. Whether a call of PrepareModel or PrepareResponse is under way.
+  // Any thread. Whether one of the calls on making_strand() is under way.
   bool making() const { return making_; }
 
   // Any thread. Records that a client has used the session now.

@@ -12,6 +12,8 @@
 #include "core/base/error_reason.h"
 #include "core/base/status_macros.h"
 #include "core/mechanics/prepared_answers/create_response.h"
+#include "core/mechanics/uncertainty/material_expansion.h"
+#include "core/mechanics/uncertainty/uncertainty_band.h"
 #include "core/mesh/payload/sha256.h"
 
 namespace tissueform {
@@ -171,6 +173,24 @@ std::shared_ptr<const BandColumns> SharedPreparation::FindBand(
     if (made.ranges == request.ranges && made.vertices == request.vertices) return prepared->band;
   }
   return nullptr;
+}
+
+absl::StatusOr<Eigen::VectorXf> SharedPreparation::FindMaterialBand(
+    DeformationModel model, const MaterialUncertainty& uncertainty,
+    absl::Span<const HandlePose> poses, const Positions& deformed,
+    const Cancellation& cancellation) {
+  // Of each tissue and of Poisson's ratio forces and a field, besides what the expansion admits.
+  const int64_t terms = static_cast<int64_t>(uncertainty.tissues.size()) + 1;
+  TF_RETURN_IF_ERROR(Admit(3 * terms * deformed.size() * static_cast<int64_t>(sizeof(double))));
+  const absl::Cleanup settle = [this] { Settle(); };
+  TF_ASSIGN_OR_RETURN(const AnswerExpansion expansion,
+                      ExpandAnswer(preparation_.get(), model, uncertainty, poses, deformed,
+                                   ExpansionOrder::kFirst, cancellation));
+  Eigen::MatrixXf fields(deformed.size(), static_cast<Eigen::Index>(expansion.terms.size()));
+  for (size_t t = 0; t < expansion.terms.size(); ++t) {
+    fields.col(static_cast<Eigen::Index>(t)) = expansion.terms[t].field.col(0).cast<float>();
+  }
+  return FirstOrderBand(fields);
 }
 
 std::shared_ptr<const ProgressFeed::Follower> SharedPreparation::Follow(

@@ -91,6 +91,17 @@ class SharedPreparation {
       const ResponseRequest& request, const GradientFieldOptions& gradient_field,
       const Cancellation& cancellation);
 
+  // On the strand. Of each vertex the 95th percentile of the distance in mm, in first order, for an
+  // answer of one of the elastic models: `deformed` (#V by 3, mm) under `poses`. With contact.
+  // REQUIRES: Begin succeeded.
+  //
+  // Errors: those of ExpandAnswer; ResourceExhausted.
+  absl::StatusOr<Eigen::VectorXf> FindMaterialBand(DeformationModel model,
+                                                   const MaterialUncertainty& uncertainty,
+                                                   absl::Span<const HandlePose> poses,
+                                                   const Positions& deformed,
+                                                   const Cancellation& cancellation);
+
   // Hears how far it is for as long as the result lives, while MakeModel makes what the model
   // needs, or PrepareResponse these answers, for any caller. Null where `on_progress` is empty.
   std::shared_ptr<const ProgressFeed::Follower> Follow(DeformationModel model,

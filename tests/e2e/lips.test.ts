@@ -4,7 +4,7 @@
 import { execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { pathToFileURL } from "node:url";
+import { fileURLToPath, pathToFileURL } from "node:url";
 import type { BrowserContext, Page } from "playwright-core";
 import { handMadeCase } from "../../client/web/tests/testing/hand_made_case";
 import { type Hook, Planner, live, openCase, saveExport, seriousFindings, typeMove } from "./planner";
@@ -60,7 +60,7 @@ function lipGaps(page: Page): Promise<{ most: number; least: number }> {
 
 const shownPoints = (page: Page) => page.evaluate(() => (globalThis as unknown as Hook).tissueform.view.points.get("contact")?.geometry.attributes.position.count ?? 0);
 
-test("the page says how tissue touches, and that it knows no band", async () => {
+test("the page says how tissue touches", async () => {
   const { page, faults } = await openFace("lips", true);
   await typeMove(page, "Up", "2");
   await page.getByText(/^Tissue presses at \d+ of \d+ places, with at most 0\.\d+ N at one \(bright points: strong\)\. Lips up to 0\.0 mm apart\.$/).waitFor();
@@ -71,6 +71,45 @@ test("the page says how tissue touches, and that it knows no band", async () => 
   await page.getByText(/^Tissue presses at 0 of \d+ places\. Lips up to (?!0\.0)\d\.\d mm apart\.$/).waitFor();
   expect(await shownPoints(page)).toBe(0);
   expect(await page.getByLabel("Color by").locator("option").allTextContents()).not.toContain("95 % interval (material)");
+  expect(await seriousFindings(page)).toEqual([]);
+  expect(faults).toEqual([]);
+  await page.close();
+});
+
+/** The material’s part that the page shows of the vertices of the skin, and what the command line says of the same. */
+async function bothBands(page: Page): Promise<[number[], number[]]> {
+  const plan = await saveExport(planner, page, "Plan JSON", "tissueform-plan.json");
+  const shown = await page.evaluate(() => {
+    const { bench } = (globalThis as unknown as Hook).tissueform;
+    const places = bench.file.surfaces[0].follows.places as Uint32Array;
+    return Array.from(places, (place): [number, number] => [bench.file.followed[place], bench.shownBand[place]]);
+  });
+  const out = join(planner.folder, "banded.vtu");
+  execFileSync(join(BIN, "tissueform"), ["deform", plan, "--model", "linear_elastic", "--out", out]);
+  const read = `import json, meshio; print(json.dumps(meshio.read(${JSON.stringify(out)}).point_data["material_uncertainty_p95_mm"].tolist()))`;
+  const said: number[] = JSON.parse(execFileSync("/usr/bin/python3", ["-c", read], { encoding: "utf8" }));
+  return [shown.map(([, band]) => band), shown.map(([vertex]) => said[vertex])];
+}
+
+test("the material’s part of the interval comes when the hand rests, and is that of the command line", async () => {
+  const plan = fileURLToPath(new URL("../data/plans/head_lips/plan.json", import.meta.url));
+  const path = join(planner.folder, "head_lips.tfcase");
+  execFileSync(join(BIN, "tissueform"), ["case", "pack", plan, "--out", path]);
+  const { page, faults } = await openCase(context, planner, path);
+  const hasBand = () => page.evaluate(() => Math.max(0, ...((globalThis as unknown as Hook).tissueform.bench.shownBand ?? [])) > 0);
+  await page.getByText("Linear elastic", { exact: true }).click();
+  await typeMove(page, "Forward", "6");
+  await expect.poll(hasBand).toBe(true);
+  await saveExport(planner, page, "Case file", "tissueform-case.tfcase");
+  const [shown, said] = await bothBands(page);
+  // The page's is of first order, the command line's of second.
+  const largest = Math.max(...said);
+  expect(largest).toBeGreaterThan(0.1);
+  expect(farthest(shown, said)).toBeLessThan(0.15 * largest);
+  await page.getByLabel("Color by").selectOption({ label: "95 % interval (material)" });
+  await typeMove(page, "Forward", "3");
+  expect(await hasBand()).toBe(false);
+  await expect.poll(hasBand).toBe(true);
   expect(await seriousFindings(page)).toEqual([]);
   expect(faults).toEqual([]);
   await page.close();

@@ -275,6 +275,98 @@ TEST_F(ContactSessionsTest, SealedLipsAreThoseOfThisProcessAndFreeOnesStayFree) 
   EXPECT_GT(sealed_by_mm, 0.1);
 }
 
+class ContactBandTest : public ContactSessionsTest {
+ protected:
+  // Half the block is one tissue, the other half is known.
+  ContactBandTest() {
+    ranges_.tissues = {{"", 1}, {"", 2}};
+    for (Eigen::Index t = 0; t < block_.mesh.num_tets(); ++t) {
+      const double z = block_.mesh.positions()(block_.mesh.tets().row(t), 2).mean();
+      ranges_.tissue_of_tet.push_back(z < 2 ? 0 : 1);
+    }
+  }
+
+  // With the stiffness of the uncertain tissue times `factor`.
+  PlanProblem WithFactor(PlanProblem problem, double factor) const {
+    for (Eigen::Index t = 0; t < problem.stiffness.size(); ++t) {
+      if (ranges_.tissue_of_tet[static_cast<size_t>(t)] == 1) problem.stiffness[t] *= factor;
+    }
+    return problem;
+  }
+
+  v1::DeformOnceRequest Request(const v1::Session& session, v1::DeformationModel model,
+                                const HandlePose& pose) const {
+    v1::DeformOnceRequest request;
+    request.set_session(session.name());
+    request.set_model(model);
+    for (const NamedPose& named : TopPose(pose)) *request.add_poses() = ToProto(named);
+    *request.mutable_ranges() = ToProto(ranges_);
+    return request;
+  }
+
+  MaterialUncertainty ranges_;
+};
+
+// What the other stiffness does is found by solving, not by expanding.
+TEST_F(ContactBandTest, TheBandIsWhatOtherStiffnessesDo) {
+  const auto client = Connect();
+  for (const DeformationModel model :
+       {DeformationModel::kLinearElastic, DeformationModel::kNeoHookean}) {
+    SCOPED_TRACE(TraitsOf(model).name);
+    PlanProblem problem = Problem(block_.rows);
+    problem.deformer.model = model;
+    const v1::Session session = MakeContactSession(client.get(), problem);
+    const HandlePose pose = Poses()[2];
+    ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse answer,
+                         client->DeformOnce(Request(session, ToProto(model), pose)));
+    EXPECT_EQ(answer.no_uncertainty(), "");
+    EXPECT_GT(answer.summary().contact().pressing_row_count(), 0);
+    const Eigen::Index count = block_.mesh.num_vertices();
+    ASSERT_OK_AND_ASSIGN(const Eigen::VectorXf band,
+                         FloatsFromBytes(answer.uncertainty_p95_mm(), count));
+    constexpr double kStep = 1e-3;
+    const Positions apart = Solve(WithFactor(problem, std::exp(kStep)), pose).positions -
+                            Solve(WithFactor(problem, std::exp(-kStep)), pose).positions;
+    const Eigen::VectorXd expected = apart.rowwise().norm() * (std::log(2) / (2 * kStep));
+    EXPECT_GT(expected.maxCoeff(), 0.01) << "mm";
+    EXPECT_LT((band.cast<double>() - expected).cwiseAbs().maxCoeff(), 1e-3 * expected.maxCoeff());
+  }
+}
+
+TEST_F(ContactBandTest, TheBandIsOfTheSelectedVertices) {
+  const auto client = Connect();
+  const v1::Session session = MakeContactSession(client.get(), Problem(block_.rows));
+  v1::DeformOnceRequest request =
+      Request(session, v1::DEFORMATION_MODEL_LINEAR_ELASTIC, Poses()[2]);
+  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse all, client->DeformOnce(request));
+  ASSERT_OK_AND_ASSIGN(const Eigen::VectorXf of_all,
+                       FloatsFromBytes(all.uncertainty_p95_mm(), block_.mesh.num_vertices()));
+  for (const int32_t vertex : {30, 20, 25}) {
+    request.mutable_vertices()->mutable_list()->add_vertices(vertex);
+  }
+  ASSERT_OK_AND_ASSIGN(const v1::DeformOnceResponse some, client->DeformOnce(request));
+  ASSERT_OK_AND_ASSIGN(const Eigen::VectorXf of_some,
+                       FloatsFromBytes(some.uncertainty_p95_mm(), 3));
+  EXPECT_EQ(of_some, Eigen::VectorXf(of_all({30, 20, 25})));
+}
+
+TEST_F(ContactBandTest, NoBandIsGivenWhereNoneIsKnown) {
+  const auto client = Connect();
+  const v1::Session sealed = MakeContactSession(client.get(), SealProblem(true));
+  ASSERT_OK_AND_ASSIGN(
+      const v1::DeformOnceResponse answer,
+      client->DeformOnce(Request(sealed, v1::DEFORMATION_MODEL_LINEAR_ELASTIC, Poses()[1])));
+  EXPECT_FALSE(answer.positions().empty());
+  EXPECT_EQ(answer.uncertainty_p95_mm(), "");
+  EXPECT_THAT(answer.no_uncertainty(), HasSubstr("sealed lips"));
+  EXPECT_THAT(client->DeformOnce(Request(sealed, v1::DEFORMATION_MODEL_ARAP, Poses()[1])),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       HasSubstr("ranges need linear_elastic or neo_hookean")));
+  v1::DeformOnceRequest damaged = Request(sealed, v1::DEFORMATION_MODEL_LINEAR_ELASTIC, Poses()[1]);
+  damaged.mutable_ranges()->mutable_tissues()->pop_back();
+  EXPECT_THAT(client->DeformOnce(damaged), StatusIs(absl::StatusCode::kInvalidArgument));
+}
+
 TEST_F(ContactSessionsTest, PredictionsDistinguishSealedLipsFromFreeOnes) {
   const auto client = Connect();
   std::vector<std::string> recipes;

@@ -12,7 +12,6 @@
 #include "client/cli/shared/stage_progress.h"
 #include "core/base/percentiles.h"
 #include "core/base/status_macros.h"
-#include "core/mechanics/uncertainty/held_contact.h"
 #include "core/mesh/tet_topology.h"
 #include "core/planning/skin_places.h"
 
@@ -20,23 +19,6 @@ namespace tissueform {
 namespace {
 
 bool IsElastic(const PlanProblem& problem) { return TraitsOf(problem.deformer.model).is_elastic; }
-
-absl::StatusOr<AnswerExpansion> Expand(const PlanProblem& problem, const Positions& deformed,
-                                       MeshPreparation* preparation) {
-  const bool is_nonlinear = problem.deformer.model == DeformationModel::kNeoHookean;
-  const SparseMatrix held = HeldDirections(problem.constraints, problem.mesh->positions(),
-                                           problem.poses, deformed, is_nonlinear);
-  const SparseMatrix* with_contact = problem.constraints.contact().empty() ? nullptr : &held;
-  if (is_nonlinear) {
-    return ExpandNeoHookean(preparation, *problem.uncertainty, deformed, ExpansionOrder::kSecond,
-                            {}, with_contact);
-  }
-  const Positions displacements = deformed - problem.mesh->positions();
-  return ExpandLinearElastic(
-      preparation, *problem.uncertainty,
-      Eigen::Map<const Eigen::VectorXd>(displacements.data(), displacements.size()),
-      ExpansionOrder::kSecond, {}, with_contact);
-}
 
 std::vector<int32_t> WithoutConstrained(std::vector<int32_t> vertices,
                                         const ConstraintSet& constraints) {
@@ -106,7 +88,9 @@ absl::StatusOr<std::optional<MaterialBand>> FindMaterialBand(
                                              problem.deformer.preparation));
   }
   MaterialBand band;
-  TF_ASSIGN_OR_RETURN(band.expansion, Expand(problem, deformed, preparation.get()));
+  TF_ASSIGN_OR_RETURN(band.expansion,
+                      ExpandAnswer(preparation.get(), problem.deformer.model, *problem.uncertainty,
+                                   problem.poses, deformed, ExpansionOrder::kSecond));
   band.band = SampleBand(band.expansion, SurfaceNormals(*problem.mesh, deformed),
                          problem.deformer.preparation.threads);
   for (const SkinPlace& place : places) {

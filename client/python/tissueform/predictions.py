@@ -63,6 +63,11 @@ def positions_of(data: bytes) -> Positions:
     return np.frombuffer(data, dtype="<f4").reshape(-1, 3)
 
 
+def band_of(data: bytes) -> Optional[npt.NDArray[np.float32]]:
+    """(#V,) in mm; None where the answer has none."""
+    return np.frombuffer(data, dtype="<f4") if data else None
+
+
 @dataclasses.dataclass(frozen=True)
 class Prediction:
     """One answer.
@@ -72,7 +77,8 @@ class Prediction:
     the numbers). summary: how it was found (v1.SolveSummary: converged, iterations, solve_seconds, load, obstacle, prepared,
     error_bound_mm, ...); an answer that has not converged is not an error. quality: tets that are inverted and volumes
     (v1.DeformationQuality); only of Session.predict. uncertainty_p95_mm: (#V,) float32 where ranges of the material were given: the
-    vertex is within it in 95 of 100 cases if only the material is uncertain.
+    vertex is within it in 95 of 100 cases if only the material is uncertain. no_uncertainty: why it is not known although ranges were
+    given; only of Session.predict.
     """
 
     positions: Positions
@@ -80,6 +86,7 @@ class Prediction:
     vertices: Optional[npt.NDArray[np.int32]] = None
     quality: Optional[deform_service_pb2.DeformationQuality] = None
     uncertainty_p95_mm: Optional[npt.NDArray[np.float32]] = None
+    no_uncertainty: str = ""
 
     @property
     def converged(self) -> bool:
@@ -109,9 +116,8 @@ class Frame(Prediction):
 
 
 def frame_of(message: deform_service_pb2.DeformFrame, vertices: Optional[npt.NDArray[np.int32]]) -> Frame:
-    band = np.frombuffer(message.uncertainty_p95_mm, dtype="<f4") if message.uncertainty_p95_mm else None
-    return Frame(positions_of(message.positions), message.summary, vertices, None, band, message.sequence, message.refinement,
-                 message.refining, message.coalesced_count)
+    return Frame(positions_of(message.positions), message.summary, vertices, None, band_of(message.uncertainty_p95_mm), "",
+                 message.sequence, message.refinement, message.refining, message.coalesced_count)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,7 +144,10 @@ class Prepared:
     ranges: Optional[MaterialRanges] = None
 
 
-def _ranges_to_proto(ranges: MaterialRanges) -> deform_service_pb2.MaterialRanges:
+def ranges_to_proto(ranges: Optional[MaterialRanges]) -> Optional[deform_service_pb2.MaterialRanges]:
+    """None: the material is known."""
+    if ranges is None:
+        return None
     tissues = np.asarray(ranges.tissues)
     if tissues.ndim != 1 or tissues.dtype.kind not in "iu" or not (0 <= tissues.min(initial=0) and tissues.max(initial=0) < len(ranges.factors_95)):
         raise InvalidInput(f"tissues have the shape {tissues.shape} and the type {tissues.dtype}: expected integers from 0 to "
@@ -155,4 +164,4 @@ def prepared_to_proto(prepared: Union[bool, Prepared]) -> Optional[deform_servic
     options = Prepared() if prepared is True else prepared
     return deform_service_pb2.PreparedAnswers(tolerance_mm=options.tolerance_mm, max_rotation=options.max_rotation,
                                               max_estimate_mm=options.max_estimate_mm,
-                                              ranges=None if options.ranges is None else _ranges_to_proto(options.ranges))
+                                              ranges=ranges_to_proto(options.ranges))

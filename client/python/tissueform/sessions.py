@@ -14,8 +14,8 @@ from .errors import InvalidInput, NotFound, ServerError, ServerUnavailable, Tiss
 from .fitting import Fit, FitTarget, Freedom, fit_of, fit_request
 from .meshes import Mesh, check_stiffness
 from .poses import Pose, Poses, Vector, poses_of, poses_to_proto, vector_to_proto
-from .predictions import (MODEL_NAMES, Prediction, Prepared, Vertices, indices_of, model_to_proto, positions_of, prepared_to_proto,
-                          selection_to_proto)
+from .predictions import (MODEL_NAMES, MaterialRanges, Prediction, Prepared, Vertices, band_of, indices_of, model_to_proto,
+                          positions_of, prepared_to_proto, ranges_to_proto, selection_to_proto)
 from .prepared_answers import PreparedAnswers, read_answers
 from .stored_predictions import PredictionCalls, StoredPrediction
 from .v1 import deform_service_pb2, deform_service_pb2_grpc, plan_service_pb2_grpc, session_pb2, session_service_pb2, session_service_pb2_grpc
@@ -129,17 +129,21 @@ class Session:
         """The poses that were last committed by a drag, as of the last refresh; empty: none."""
         return poses_of(self.description.committed_poses)
 
-    def predict(self, poses: Poses, *, vertices: Vertices = "all", model: Optional[str] = None) -> Prediction:
+    def predict(self, poses: Poses, *, vertices: Vertices = "all", model: Optional[str] = None,
+                ranges: Optional[MaterialRanges] = None) -> Prediction:
         """One answer. poses: one for each handle that moves; the others rest. vertices: "all", "skin" (in the order of the server) or
-        numbers. model: another than the session's own. The positions are bit by bit those of `tissueform run`.
+        numbers. model: another than the session's own. The positions are bit by bit those of `tissueform run`. ranges: of
+        linear_elastic and neo_hookean, the answer has uncertainty_p95_mm, also with contact; takes seconds in a head.
 
         Errors: InvalidInput, NotFound (the session has ended), LimitExceeded, ServerUnavailable.
         """
         request = deform_service_pb2.DeformOnceRequest(session=self.name, poses=poses_to_proto(poses, self.handles),
-                                                       vertices=selection_to_proto(vertices, self._vertex_count), model=model_to_proto(model))
+                                                       vertices=selection_to_proto(vertices, self._vertex_count), model=model_to_proto(model),
+                                                       ranges=ranges_to_proto(ranges))
         response = self._caller.unary(self._deform.DeformOnce, request, self.name)
         numbers = None if isinstance(vertices, str) else indices_of(vertices, "vertices", self._vertex_count)
-        return Prediction(positions_of(response.positions), response.summary, numbers, response.quality)
+        return Prediction(positions_of(response.positions), response.summary, numbers, response.quality,
+                          band_of(response.uncertainty_p95_mm), response.no_uncertainty)
 
     def drag(self, *, vertices: Vertices = "all", model: Optional[str] = None, prepared: Union[bool, Prepared] = False,
              max_unacked: int = 2, reconnect_timeout: float = 60.0, on_notice: Optional[Callable[[Notice], None]] = None) -> Drag:

@@ -215,4 +215,28 @@ absl::StatusOr<AnswerExpansion> ExpandNeoHookean(MeshPreparation* preparation,
   return expander.Expand(*system);
 }
 
+absl::StatusOr<AnswerExpansion> ExpandAnswer(MeshPreparation* preparation, DeformationModel model,
+                                             const MaterialUncertainty& uncertainty,
+                                             absl::Span<const HandlePose> poses,
+                                             const Positions& deformed, ExpansionOrder order,
+                                             const Cancellation& cancellation) {
+  if (!TraitsOf(model).is_elastic) {
+    return absl::InvalidArgumentError(
+        "the band of uncertainty needs linear_elastic or neo_hookean; choose one of them");
+  }
+  const bool is_nonlinear = model == DeformationModel::kNeoHookean;
+  const Positions& rest = preparation->mesh().positions();
+  const ConstraintSet& constraints = preparation->constraints();
+  const SparseMatrix held = HeldDirections(constraints, rest, poses, deformed, is_nonlinear);
+  const SparseMatrix* with_contact = constraints.contact().empty() ? nullptr : &held;
+  if (is_nonlinear) {
+    return ExpandNeoHookean(preparation, uncertainty, deformed, order, cancellation, with_contact);
+  }
+  const Positions displacements = deformed - rest;
+  return ExpandLinearElastic(
+      preparation, uncertainty,
+      Eigen::Map<const Eigen::VectorXd>(displacements.data(), displacements.size()), order,
+      cancellation, with_contact);
+}
+
 }  // namespace tissueform

@@ -6,10 +6,13 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/types/span.h"
 
 #include "core/base/cancellation.h"
 #include "core/base/types.h"
+#include "core/mechanics/constraints/handle_pose.h"
 #include "core/mechanics/deformation/mesh_preparation.h"
+#include "core/mechanics/deformation/model.h"
 #include "core/mechanics/uncertainty/material_uncertainty.h"
 
 namespace tissueform {
@@ -65,5 +68,13 @@ absl::StatusOr<AnswerExpansion> ExpandNeoHookean(MeshPreparation* preparation,
                                                  const Positions& deformed, ExpansionOrder order,
                                                  const Cancellation& cancellation = {},
                                                  const SparseMatrix* held = nullptr);
+
+// Of an answer of one of these two models, with its contact: `deformed` (#V by 3, mm) under
+// `poses`, one a handle. Errors: those of the two; InvalidArgument for another model.
+absl::StatusOr<AnswerExpansion> ExpandAnswer(MeshPreparation* preparation, DeformationModel model,
+                                             const MaterialUncertainty& uncertainty,
+                                             absl::Span<const HandlePose> poses,
+                                             const Positions& deformed, ExpansionOrder order,
+                                             const Cancellation& cancellation = {});
 
 }  // namespace tissueform

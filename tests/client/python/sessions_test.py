@@ -149,6 +149,10 @@ class PreparedAnswersTest(unittest.TestCase):
             largest = frame.uncertainty_p95_mm.max()
             np.testing.assert_allclose(here.uncertainty_p95_mm, frame.uncertainty_p95_mm, rtol=0, atol=0.1 * largest)
             self.assertIsNone(session.prepared_answers().evaluate(BEND).uncertainty_p95_mm)
+            once = session.predict(BEND, ranges=ranges)
+            np.testing.assert_allclose(once.uncertainty_p95_mm, frame.uncertainty_p95_mm, rtol=0, atol=1e-4 * largest)
+            self.assertEqual(once.no_uncertainty, "")
+            self.assertIsNone(session.predict(BEND).uncertainty_p95_mm)
             wrong = tissueform.MaterialRanges(tissues, factors_95=[1.8])
             with self.assertRaisesRegex(tissueform.InvalidInput, "from 0 to 0 for each tet"):
                 session.drag(prepared=tissueform.Prepared(ranges=wrong))

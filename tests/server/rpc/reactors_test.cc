@@ -138,7 +138,7 @@ TEST_F(FrameBandTest, RangesThatDoNotFitTheSessionAreRefused) {
     EXPECT_THAT(status->error_message(), HasSubstr(why));
   };
   v1::DeformRequest request = WithRanges(v1::DEFORMATION_MODEL_GRADIENT_FIELD);
-  refused(request, "prepared.ranges need linear_elastic or neo_hookean");
+  refused(request, "ranges need linear_elastic or neo_hookean");
   request.mutable_configuration()->mutable_prepared()->mutable_ranges()->set_tissues("?");
   refused(request, "ranges.tissues has 1 bytes");
 }

@@ -150,10 +150,16 @@ export class LandmarkBook {
     return sideProblem(landmark, toFacePoint(anchorPoint(surface, anchor), faceFrame(this.file)), hasHeadFrame(this.file));
   }
 
-  /** Where the case says which segment the landmark is on, no other one holds it. */
+  /** Where the case says which segment the landmark is on, no other one holds it; and a tooth is never on the segment of those that it meets. */
   private isOfJaw(name: string, surface: number): boolean {
-    const handle = this.file.manifest.landmarks.find((known) => known.name === name.replace(/midline$/, "incisor"))?.handle ?? "";
-    return handle === "" || this.file.surfaces[surface].entry.handle === handle;
+    const { handle } = this.file.surfaces[surface].entry;
+    const own = this.handleOf(name);
+    if (own !== "") return handle === own;
+    return handle === "" || handle !== this.handleOf(name.replace(/^(upp|low)er/, (jaw) => (jaw === "upper" ? "lower" : "upper")));
+  }
+
+  private handleOf(name: string): string {
+    return this.file.manifest.landmarks.find((known) => known.name === name.replace(/midline$/, "incisor"))?.handle ?? "";
   }
 
   private set(state: State): void {

@@ -51,7 +51,7 @@ function mapChoices(bench: Workbench): Choice<SharedMap>[] {
     { value: "movement", label: "Movement of the skin" },
     { value: "difference", label: "Difference to the plan chosen above" },
   ];
-  return bench.hasBand ? [...choices, { value: "band", label: "95 % interval (material)" }] : choices;
+  return bench.hasBandAtOnce ? [...choices, { value: "band", label: "95 % interval (material)" }] : choices;
 }
 
 /** Name of the edited plan, and what becomes of it. */

@@ -149,7 +149,7 @@ export class SideBySidePage {
       "All plans are answered by the planner’s model.",
       "Directions are those of the head frame; the numbers of a segment are about the planner’s rotation center.",
       isWhole ? wholeBandText("a measure and a landmark’s movement", this.set.plans.value.flatMap(({ bands }) => Array.from(bands?.values() ?? []))) : "",
-      this.bench.hasBand ? `Below ${isWhole ? "the largest movement" : "a movement"}: 95 % interval, material uncertainty only.` : "",
+      this.bench.hasBandAtOnce ? `Below ${isWhole ? "the largest movement" : "a movement"}: 95 % interval, material uncertainty only.` : "",
       missing === 0 ? "" : `${missing} measures need landmarks: confirm them in the planner, under Measures.`,
     ].filter((text) => text !== "").join(" ");
   }

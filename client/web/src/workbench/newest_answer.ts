@@ -46,6 +46,11 @@ export class NewestAnswer {
     return true;
   }
 
+  /** Of the newest answer, where it came later. */
+  takeBand(bandMm: Float32Array): void {
+    this.bandMm = bandMm;
+  }
+
   /** The page's own. Returns whether it was taken: not if it is of other vertices. */
   takeOwn({ positions, uncertainty, errorBoundMm, isEstimate }: Omit<Evaluation, "coverage">): boolean {
     if (positions.length !== this.rest.length) return false;

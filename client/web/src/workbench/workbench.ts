@@ -110,12 +110,15 @@ export class Workbench implements ShownFace {
   private readonly penetrationTest: PenetrationTest;
   /** Of the face that is shown: of each of CaseFile.followed, mm; null where none is known. */
   private shownBand: Float32Array | null = null;
+  /** Why it has none, where tissue touches. */
+  private noBand = "";
+  private seeking: AbortController | undefined;
   private waitingFrom: number | null = null;
   private settling: ReturnType<typeof setTimeout> | undefined;
 
   /** `models`: of the server. */
   constructor(
-    gateway: Gateway,
+    private readonly gateway: Gateway,
     readonly file: CaseFile,
     readonly caseName: string,
     readonly view: HeadView,
@@ -212,15 +215,20 @@ export class Workbench implements ShownFace {
     }
   }
 
-  /** The band needs ranges of the material and a model whose prepared answers know them. */
+  /** The band needs ranges of the material and an elastic model. Where tissue touches it comes when the hand rests. */
   get hasBand(): boolean {
+    return this.isUncertain(this.model.value);
+  }
+
+  /** Prepared answers know it. */
+  get hasBandAtOnce(): boolean {
     return this.knowsBand(this.model.value);
   }
 
   /** Of what is shown, in words; empty where there is one, or none yet. */
   get whyNoBand(): string {
-    if (this.touches) return "not known where lips part and slide";
     if (!this.hasBand) return "this model or case has none";
+    if (this.touches) return this.shownBand === null ? this.noBand : "";
     const turnsTooFar = Array.from(this.shownPoses.values()).some(({ rotationVector }) => Math.hypot(...rotationVector) > LARGEST_BAND_ROTATION);
     return this.shownBand === null && turnsTooFar ? "a segment turns by more than 30 degrees, which linear elasticity treats as strain" : "";
   }
@@ -296,7 +304,7 @@ export class Workbench implements ShownFace {
   /** Skin and bone under other poses, by the page's own answers; null where it has none of them. */
   async shapeAt(poses: Pose[]): Promise<Shape | null> {
     const displacements = await this.displacementsAt(poses);
-    return displacements && { displacements, uncertainty: this.hasBand ? await this.local.bandAt(poses) : null, poses };
+    return displacements && { displacements, uncertainty: this.hasBandAtOnce ? await this.local.bandAt(poses) : null, poses };
   }
 
   /** Where bone overlaps under other poses, more than pre-op. */
@@ -329,7 +337,10 @@ export class Workbench implements ShownFace {
   }
 
   private knowsBand(model: DeformationModel): boolean {
-    if (this.touches) return false;
+    return !this.touches && this.isUncertain(model);
+  }
+
+  private isUncertain(model: DeformationModel): boolean {
     const info = this.modelInfo(model);
     return this.file.materialRanges !== null && info !== undefined && info.hasPreparedAnswers && info.name !== "gradient_field";
   }
@@ -337,7 +348,7 @@ export class Workbench implements ShownFace {
   private dragChoice() {
     const info = this.modelInfo(this.model.value);
     const isPrepared = (this.touches ? info?.hasPreparedContact : info?.hasPreparedAnswers) ?? false;
-    return { model: this.model.value, isPrepared, ranges: this.hasBand ? this.file.materialRanges : null };
+    return { model: this.model.value, isPrepared, ranges: this.hasBandAtOnce ? this.file.materialRanges : null };
   }
 
   private pull(pose: Pose, isFinal: boolean): void {
@@ -398,10 +409,32 @@ export class Workbench implements ShownFace {
 
   private lay({ displacements, uncertainty }: Pick<NewestAnswer, "displacements" | "uncertainty">, used?: () => void): void {
     this.shownBand = uncertainty;
+    this.seekBand();
     this.view.head.setDisplacements(displacements);
     this.map.show(displacements, uncertainty);
     this.view.stage.invalidate(used);
     this.shown.value += 1;
+  }
+
+  /** Of the plan's newest answer, once the hand rests. */
+  private seekBand(): void {
+    this.seeking?.abort();
+    if (!this.touches || !this.hasBand || this.shownBand !== null || this.comparison.value !== null) return;
+    this.noBand = "it comes when the hand rests";
+    const { signal } = (this.seeking = new AbortController());
+    const ask = () => ({ file: this.file, session: this.live.session, model: this.model.value, poses: this.jaw.apply(this.plan.poses()) });
+    void import("./resting_band")
+      .then(({ findBand }) => findBand(this.gateway, ask, signal))
+      .then(
+        ({ bandMm, reason }) => {
+          if (signal.aborted) return;
+          this.noBand = reason;
+          if (bandMm !== null) this.newest.takeBand(bandMm);
+          if (bandMm !== null) this.lay(this.newest);
+          else this.shown.value += 1;
+        },
+        (thrown) => signal.aborted || (this.noBand = messageOf(thrown)),
+      );
   }
 
   private setPoses(poses: readonly Pose[]): void {

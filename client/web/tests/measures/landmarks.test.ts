@@ -73,6 +73,16 @@ test("a landmark whose segment the case knows lies on no other one", async () =>
   expect(other.place("pogonion", middle(SEGMENT))).toMatch(/moves with another segment/);
 });
 
+test("an upper tooth is not on the segment of the lower one, although it may be the nearest surface", () => {
+  const lower = { ...file.manifest.landmarks[0], name: "lower_incisor", handle: "mandible" };
+  const met = new LandmarkBook({ ...file, manifest: { ...file.manifest, landmarks: [...file.manifest.landmarks, lower] } });
+  for (const name of ["upper_incisor", "upper_midline"]) {
+    expect(met.place(name, middle(SEGMENT))).toMatch(/moves with another segment/);
+    expect(book.place(name, middle(SEGMENT))).toBe("");
+  }
+  expect(met.place("lower_midline", middle(SEGMENT))).toBe("");
+});
+
 test("suggestions count when they are confirmed, together as one step", () => {
   book.suggest(new Map([["pronasale", middle(SKIN)], ["subnasale", middle(SKIN)]]));
   expect(measureFace(shown()).find(({ definition }) => definition.name === "chin_midline")?.kind).toBe("missing");

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
 import { expect, test } from "vitest";
-import { describeSeal } from "../../src/panels/contact_part";
+import { describeSeal } from "../../src/panels/touch_part";
 
 test("what a seal does is said, and that it is posture", () => {
   expect(describeSeal(0, null)).toBe("");
