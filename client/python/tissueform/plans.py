@@ -18,6 +18,7 @@ from .client import Client
 from .errors import InvalidInput, NotFound
 from .meshes import Points, Tets, check_points, check_tets
 from .poses import Pose
+from .predictions import MaterialRanges
 from .sessions import FIXED_BONE, ContactRow, LipEdge, Session
 
 Arrays = Mapping[str, npt.NDArray[Any]]
@@ -27,7 +28,8 @@ Arrays = Mapping[str, npt.NDArray[Any]]
 class Plan:
     """Made by read_plan. points: (#V, 3) in mm. tets: (#T, 4). stiffness: in Pa, one number or (#T,). fixed, handles: masks, (#V,) bool;
     vertices of contact rows are in none of them. poses: those of the plan, by handle. point_data, cell_data: arrays of the mesh by name.
-    lip_edge: what `create_session(seal=True)` holds together, or None. coordinate_system: "LPS" or "RAS", of points and poses."""
+    lip_edge: what `create_session(seal=True)` holds together, or None. ranges: of the material, for `Session.predict(..., ranges=)`; None
+    where the plan states none. coordinate_system: "LPS" or "RAS", of points and poses."""
 
     points: Points
     tets: Tets
@@ -42,6 +44,7 @@ class Plan:
     point_data: Arrays
     cell_data: Arrays
     lip_edge: Optional[LipEdge] = None
+    ranges: Optional[MaterialRanges] = None
 
     def create_session(self, client: Client, *, model: Optional[str] = None, seal: bool = False, **options: Any) -> Session:
         """Uploads the mesh and prepares a session of this plan. model: another than the plan's. seal: closed lips stay closed
@@ -91,7 +94,7 @@ def _plan_of(plan: Any, file: pathlib.Path) -> Plan:
     return Plan(points=points, tets=tets, stiffness=_stiffness(plan["stiffness"], cell_data),
                 fixed=_selected(plan["fixed"], points, point_data) & ~free, handles=handles,
                 poses={handle["name"]: _pose(handle.get("pose", {})) for handle in plan["handles"]}, contact=contact,
-                lip_edge=_lip_edge(plan.get("contact", {}).get("seal")),
+                lip_edge=_lip_edge(plan.get("contact", {}).get("seal")), ranges=_ranges(plan, cell_data, len(tets)),
                 model=plan.get("model", "gradient_field"), poisson_ratio=plan.get("poisson_ratio"),
                 coordinate_system=plan["coordinate_system"], point_data=point_data, cell_data=cell_data)
 
@@ -185,6 +188,32 @@ def _stiffness(stiffness: Any, cell_data: Arrays) -> Union[float, npt.NDArray[np
     if np.isnan(result).any():
         raise InvalidInput(f'the plan states no stiffness for a label of "{stiffness["by_cell_data"]}"')
     return result
+
+
+def _ranges(plan: Any, cell_data: Arrays, tet_count: int) -> Optional[MaterialRanges]:
+    if "uncertainty" not in plan:
+        return None
+    uncertainty = plan["uncertainty"]
+    factor = uncertainty.get("youngs_modulus_factor_95", 1)
+    labels = _tissues(factor, plan["stiffness"], cell_data, tet_count)
+    values, tissues = np.unique(labels, return_inverse=True)
+    by_label = {float(label): float(number) for label, number in factor["values"].items()} if isinstance(factor, dict) else {}
+    missing = [value for value in values if isinstance(factor, dict) and float(value) not in by_label]
+    if missing:
+        raise InvalidInput(f'the plan states no range for the label {missing[0]:g} of "{factor["by_cell_data"]}"')
+    factors = [by_label.get(float(value), factor) for value in values]
+    ratio = uncertainty.get("poisson_ratio_95")
+    return MaterialRanges(tissues=tissues, factors_95=factors, poisson_ratio=None if ratio is None else (ratio[0], ratio[1]))
+
+
+def _tissues(factor: Any, stiffness: Any, cell_data: Arrays, tet_count: int) -> npt.NDArray[Any]:
+    """The array that distinguishes tissues, as docs/plan-format.md states ("Ranges of the material")."""
+    for name in (factor["by_cell_data"] if isinstance(factor, dict) else None, stiffness.get("by_cell_data")):
+        if name is not None:
+            return _array(cell_data, name)
+    if "tissue" in cell_data:
+        return cell_data["tissue"]
+    return _array(cell_data, stiffness["cell_data"]) if "cell_data" in stiffness else np.zeros(tet_count)
 
 
 def _pose(pose: Any) -> Pose:

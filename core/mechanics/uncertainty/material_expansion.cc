@@ -48,14 +48,10 @@ class Expander {
     if (held != nullptr) held_ = *held;
   }
 
-  absl::StatusOr<std::unique_ptr<DirichletSystem>> Factorise(double poisson_ratio) const {
-    return DirichletSystem::Create(law_.tangent(preparation_.stiffness(), poisson_ratio),
-                                   ConstrainedUnknowns(preparation_.constraints()),
-                                   {.backend = preparation_.options().backend,
-                                    .admission = preparation_.options().admission,
-                                    .unknowns_per_node = 3,
-                                    .node_order = preparation_.node_order()},
-                                   cancellation_);
+  // With a factor of its own.
+  absl::StatusOr<AnswerExpansion> ExpandOwn() {
+    TF_ASSIGN_OR_RETURN(const auto system, Factorise(poisson_ratio()));
+    return Expand(*system);
   }
 
   absl::StatusOr<AnswerExpansion> Expand(const DirichletSystem& system) {
@@ -77,6 +73,16 @@ class Expander {
       if (uncertainty_.tissue_of_tet[static_cast<size_t>(t)] != tissue) stiffness[t] = 0;
     }
     return stiffness;
+  }
+
+  absl::StatusOr<std::unique_ptr<DirichletSystem>> Factorise(double poisson_ratio) const {
+    return DirichletSystem::Create(law_.tangent(preparation_.stiffness(), poisson_ratio),
+                                   ConstrainedUnknowns(preparation_.constraints()),
+                                   {.backend = preparation_.options().backend,
+                                    .admission = preparation_.options().admission,
+                                    .unknowns_per_node = 3,
+                                    .node_order = preparation_.node_order()},
+                                   cancellation_);
   }
 
   double poisson_ratio() const { return preparation_.options().poisson_ratio; }
@@ -186,8 +192,7 @@ absl::StatusOr<AnswerExpansion> ExpandLinearElastic(MeshPreparation* preparation
     return expander.Expand(elastic->system());
   }
   // The unknowns of the preparation's own factor are turned where tissue slides.
-  TF_ASSIGN_OR_RETURN(const auto system, expander.Factorise(preparation->options().poisson_ratio));
-  return expander.Expand(*system);
+  return expander.ExpandOwn();
 }
 
 absl::StatusOr<AnswerExpansion> ExpandNeoHookean(MeshPreparation* preparation,
@@ -211,8 +216,13 @@ absl::StatusOr<AnswerExpansion> ExpandNeoHookean(MeshPreparation* preparation,
     return Eigen::MatrixXd(Eigen::Map<const Eigen::VectorXd>(gradient.data(), gradient.size()));
   };
   Expander expander(*preparation, uncertainty, law, order, cancellation, held);
-  TF_ASSIGN_OR_RETURN(const auto system, expander.Factorise(preparation->options().poisson_ratio));
-  return expander.Expand(*system);
+  absl::StatusOr<AnswerExpansion> expansion = expander.ExpandOwn();
+  if (absl::IsFailedPrecondition(expansion.status())) {
+    return absl::FailedPreconditionError(
+        "the tangent stiffness of neo_hookean is not positive definite at this answer, so its "
+        "95 % interval is not known; linear_elastic has one");
+  }
+  return expansion;
 }
 
 absl::StatusOr<AnswerExpansion> ExpandAnswer(MeshPreparation* preparation, DeformationModel model,

@@ -76,6 +76,30 @@ class ReadPlanTest(unittest.TestCase):
             positions = session.predict(plan.poses).positions
         np.testing.assert_array_equal(meshio.read(out).points.astype(np.float32), positions)
 
+    def test_the_uncertainty_of_the_material_is_that_of_the_command(self):
+        """With contact; the server's is of first order, the command's of second."""
+        path, out = PLANS / "head_lips/plan.json", self.folder / "out.vtu"
+        tissueform_command("deform", path, "--model", "linear_elastic", "--out", out)
+        expected = meshio.read(out).point_data["material_uncertainty_p95_mm"]
+        plan = tissueform.read_plan(path)
+        with start_server() as server, server.connect() as client, plan.create_session(client, model="linear_elastic") as session:
+            self.assertGreater(session.description.contact_row_count, 0)
+            found = session.predict(plan.poses, ranges=plan.ranges)
+        self.assertEqual(found.no_uncertainty, "")
+        np.testing.assert_allclose(found.uncertainty_p95_mm, expected, rtol=0, atol=0.15 * expected.max())
+        self.assertLess(np.abs(found.uncertainty_p95_mm - expected).mean(), 0.005 * expected.max())
+
+    def test_ranges_distinguish_the_tissues_of_the_plan(self):
+        self.assertIsNone(self.read().ranges)
+        for factors, expected in ((1.5, [1.5, 1.5]), ({"by_cell_data": "label", "values": {"0": 1.8, "1": 2.2}}, [1.8, 2.2])):
+            self.plan["uncertainty"] = {"youngs_modulus_factor_95": factors, "poisson_ratio_95": [0.4, 0.47]}
+            plan = self.read()
+            self.assertEqual((plan.ranges.factors_95, plan.ranges.poisson_ratio), (expected, (0.4, 0.47)))
+            np.testing.assert_array_equal(plan.ranges.tissues, plan.cell_data["label"])
+        self.plan["uncertainty"] = {"youngs_modulus_factor_95": {"by_cell_data": "label", "values": {"0": 1.8}}}
+        with self.assertRaisesRegex(InvalidInput, 'no range for the label 1 of "label"'):
+            self.read()
+
     def test_bad_plans_are_refused_by_one_line(self):
         for change, kind, text in (({"mesh": "../bar.vtu"}, InvalidInput, "outside of the plan's folder"),
                                    ({"mesh": "other.vtu"}, NotFound, "no mesh other.vtu"),
