@@ -4,7 +4,8 @@
 import { dot } from "../geometry/rotation";
 import { readDicomHeaders } from "./dicom_file";
 import { describeKind, normalOf, type DicomHeader } from "./dicom_header";
-import { openPixels, syntaxObjection, type FilePixels } from "./dicom_pixels";
+import { syntaxObjection } from "./dicom_pixels";
+import { partsOf, pixelReaders, type PixelReader } from "./pixel_readers";
 import type { DroppedFile, OpenedCt, SeriesEntry } from "./opened_ct";
 import { factsOf, upperMedian } from "./series_facts";
 import { otherModality, pickSeries } from "./series_rules";
@@ -261,14 +262,22 @@ function notesOf(groups: readonly Group[], listing: Listing, copies: number, pro
 async function readStack(stack: SliceStack, kernel: string, onProgress: (share: number) => void, signal?: AbortSignal): Promise<Volume> {
   const [columns, rows, count] = stack.grid.size;
   const values = new Int16Array(columns * rows * count);
-  // Each file is read once; its frames may be in any order.
-  const order = stack.slices.map((slice, k) => ({ slice, k })).sort((a, b) => a.slice.fileNumber - b.slice.fileNumber);
-  let pixels: FilePixels | null = null;
-  for (const [done, { slice, k }] of order.entries()) {
-    signal?.throwIfAborted();
-    if (done === 0 || slice.fileNumber !== order[done - 1].slice.fileNumber) pixels = await openPixels(slice);
-    await pixels?.read(slice, values.subarray(k * columns * rows, (k + 1) * columns * rows));
-    onProgress((done + 1) / count);
+  const places = new Map(stack.slices.map((slice, k) => [slice, k]));
+  const readers = pixelReaders(stack.slices);
+  const waiting = partsOf(stack.slices);
+  let done = 0;
+  const work = async (reader: PixelReader) => {
+    for (let part = waiting.shift(); part !== undefined; part = waiting.shift()) {
+      signal?.throwIfAborted();
+      const images = await reader.read(part);
+      part.forEach((slice, i) => values.set(images[i], columns * rows * (places.get(slice) ?? 0)));
+      onProgress((done += part.length) / count);
+    }
+  };
+  try {
+    await Promise.all(readers.map(work));
+  } finally {
+    readers.forEach((reader) => reader.close());
   }
   return { grid: stack.grid, values, kernel };
 }

@@ -22,6 +22,11 @@ export function syntaxObjection(transferSyntax: string): string {
   return `its images are compressed in a way that is not read (transfer syntax ${name}): export them uncompressed`;
 }
 
+/** Its pixels take time to decode. */
+export function isCompressed({ transferSyntax }: DicomHeader): boolean {
+  return !NATIVE.includes(transferSyntax);
+}
+
 function cannotDecode(header: DicomHeader, why: string): Error {
   return new Error(`${nameOf(header)} cannot be read: ${why}; export the series again`);
 }
@@ -105,7 +110,7 @@ export async function openPixels(header: DicomHeader): Promise<FilePixels> {
   const bitsAllocated = data.uint16("x00280100") ?? 0;
   if (![8, 16, 32].includes(bitsAllocated)) throw cannotDecode(header, "its pixels have an unsupported type");
   const bytesPerSample = bitsAllocated / 8;
-  const isNative = NATIVE.includes(header.transferSyntax);
+  const isNative = !isCompressed(header);
   if (!isNative && (!element.fragments || element.fragments.length === 0 || !endsInDelimiter(bytes))) throw cannotDecode(header, "it is truncated");
   const isSigned = data.uint16("x00280103") === 1;
   const bitsStored = data.uint16("x00280101") ?? 0;

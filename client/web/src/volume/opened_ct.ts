@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import type { DicomHeader } from "./dicom_header";
 import type { LabelMap, Volume } from "./volume";
 
 // A CT is read in the browser. Parsing and decoding run in a worker; what leaves it is the interface below and nothing else of the files.
@@ -45,6 +46,7 @@ export type VolumeCall =
   | { readonly call: "open"; readonly files: readonly DroppedFile[] }
   | { readonly call: "read"; readonly id: string }
   | { readonly call: "labels"; readonly file: DroppedFile }
+  | { readonly call: "pixels"; readonly slices: readonly DicomHeader[] }
   | { readonly call: "cancel" };
 
 /** `number`: of the call that an answer belongs to; one that was cancelled may still answer. */
@@ -55,6 +57,7 @@ export type VolumeAnswer =
   | { readonly opened: Pick<OpenedCt, "series" | "proposed" | "notes"> }
   | { readonly volume: Volume }
   | { readonly labels: LabelMap }
+  | { readonly images: readonly Int16Array[] }
   | { readonly error: string };
 
 export type FromVolumeWorker = VolumeAnswer & { readonly number: number };

@@ -3,6 +3,7 @@
 
 import { openCtHere } from "./ct_input";
 import type { FromVolumeWorker, OpenedCt, ToVolumeWorker } from "./opened_ct";
+import { FileReader } from "./pixel_readers";
 import { readLabels } from "./volume_file";
 
 const scope = globalThis as unknown as {
@@ -10,6 +11,7 @@ const scope = globalThis as unknown as {
   postMessage(message: FromVolumeWorker, transfer?: Transferable[]): void;
 };
 let opened: OpenedCt | null = null;
+const pixels = new FileReader();
 let running = new AbortController();
 
 /** A file of a thousand need not send a thousand messages. */
@@ -34,6 +36,9 @@ async function answer(message: ToVolumeWorker, signal: AbortSignal): Promise<voi
   } else if (message.call === "labels") {
     const labels = await readLabels(message.file);
     scope.postMessage({ labels, number }, [labels.values.buffer]);
+  } else if (message.call === "pixels") {
+    const images = await pixels.read(message.slices);
+    scope.postMessage({ images, number }, images.map(({ buffer }) => buffer));
   }
 }
 
