@@ -20,6 +20,8 @@
 namespace tissueform {
 namespace {
 
+using ::testing::HasSubstr;
+
 using testing::Flat;
 using testing::StatusIs;
 using testing::UncertainBar;
