@@ -5,11 +5,12 @@
 
   time_python_drag.py PROGRAMS PLAN    by a Python that has the package: BUILD/test_scratch/python_package/venv/bin/python
 
-Prints medians of the rounds in ms: from sending a pose to having its frame, the same by grpcio alone (its call and the messages as bytes, a queue between, nothing of the
-package: the least that a Python client by grpcio can need), how long prepared answers take to evaluate in Python, and how
+Prints medians of the rounds in ms: from sending a pose to having its frame, the same by grpcio alone and by grpc.aio alone (their calls
+and the messages as bytes, nothing of the package: the least that a Python client by grpcio can need), how long prepared answers take to evaluate in Python, and how
 long a frame of 100,000 vertices takes to decode. PLAN: with handles and fixed vertices by point_data.
 """
 
+import asyncio
 import json
 import pathlib
 import queue
@@ -19,6 +20,7 @@ import sys
 import tempfile
 import time
 
+import grpc
 import meshio
 import numpy as np
 import tissueform
@@ -27,6 +29,7 @@ from tissueform.poses import poses_to_proto
 from tissueform.predictions import frame_of
 from tissueform.v1 import deform_service_pb2
 
+METHOD = "/tissueform.v1.DeformService/Deform"
 ROUNDS, SECONDS, RATES = 5, 3, (30, 300, 1000)
 
 
@@ -49,15 +52,37 @@ def message_of(**message):
     return deform_service_pb2.DeformRequest(**message).SerializeToString()
 
 
-def grpcio_ms(session, rate):
-    """The frames of the same poses; what is sent is made before, and what comes is not read."""
+def messages_of(session, rate):
+    """The configuration of a drag, and each pose with its acknowledgment: made before they are sent."""
     with session.drag(vertices="skin", prepared=True) as drag:
-        configuration = drag._configuration
-    sent = [(message_of(pose=deform_service_pb2.PoseUpdate(sequence=i + 1, poses=poses_to_proto(pose_of(session, i), session.handles))),
-             message_of(ack=deform_service_pb2.FrameAck(sequence=i + 1))) for i in range(SECONDS * rate)]
+        configuration = message_of(configuration=drag._configuration)
+    return configuration, [(message_of(pose=deform_service_pb2.PoseUpdate(sequence=i + 1, poses=poses_to_proto(pose_of(session, i), session.handles))),
+                            message_of(ack=deform_service_pb2.FrameAck(sequence=i + 1))) for i in range(SECONDS * rate)]
+
+
+async def asyncio_ms(address, configuration, sent, rate):
+    """grpc.aio alone."""
+    async with grpc.aio.insecure_channel(address) as channel:
+        call = channel.stream_stream(METHOD)()
+        await call.write(configuration)
+        await call.read()
+        times = []
+        begin = time.perf_counter()
+        for i, (update, acknowledgment) in enumerate(sent):
+            await asyncio.sleep(max(0, begin + i / rate - time.perf_counter()))
+            start = time.perf_counter()
+            await call.write(update)
+            await call.read()
+            await call.write(acknowledgment)
+            times.append(1000 * (time.perf_counter() - start))
+        return statistics.median(times)
+
+
+def grpcio_ms(session, configuration, sent, rate):
+    """The blocking calls of grpcio alone; what comes is not read."""
     requests = queue.SimpleQueue()
-    requests.put(message_of(configuration=configuration))
-    answers = session._caller.channel.stream_stream("/tissueform.v1.DeformService/Deform")(iter(requests.get, None))
+    requests.put(configuration)
+    answers = session._caller.channel.stream_stream(METHOD)(iter(requests.get, None))
     next(answers)
     times = []
     begin = time.perf_counter()
@@ -113,9 +138,12 @@ def main():
     with tissueform.local(programs / "tissueform-server") as server, server.connect() as client, tempfile.TemporaryDirectory() as folder:
         with make_session(client, plan, path.parent) as session:
             for rate in RATES:
-                rounds = [(python_ms(session, rate), grpcio_ms(session, rate), command_ms(programs, path, server.address, folder, rate)) for _ in range(ROUNDS)]
-                python, bare, command = (statistics.median(times) for times in zip(*rounds))
-                print(f"{rate} poses/s: Python {python:.2f} ms, grpcio alone {bare:.2f} ms, C++ {command:.2f} ms, ratios to C++ {python / command:.2f} and {bare / command:.2f}")
+                messages = messages_of(session, rate)
+                rounds = [(command_ms(programs, path, server.address, folder, rate), python_ms(session, rate), grpcio_ms(session, *messages, rate),
+                           asyncio.run(asyncio_ms(server.address, *messages, rate))) for _ in range(ROUNDS)]
+                command, *others = (statistics.median(times) for times in zip(*rounds))
+                named = zip(("Python", "grpcio alone", "grpc.aio alone"), others)
+                print(f"{rate} poses/s: C++ {command:.2f} ms; " + "; ".join(f"{name} {ms:.2f} ms, {ms / command:.2f} times" for name, ms in named))
             answers = session.prepared_answers(vertices="skin")
             pose = {session.handles[0]: Pose(translation_mm=(0, 2, 0))}
             print(f"prepared answers of the skin, evaluated here: {median_ms(lambda: answers.evaluate(pose)):.2f} ms")

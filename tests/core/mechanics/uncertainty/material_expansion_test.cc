@@ -21,7 +21,6 @@ namespace tissueform {
 namespace {
 
 using ::testing::HasSubstr;
-
 using testing::Flat;
 using testing::StatusIs;
 using testing::UncertainBar;
