@@ -107,15 +107,14 @@ class DeformOnceCall : public grpc::ServerUnaryReactor {
     const Cancellation cancellation([this] { return cancelled_->load(); });
     const absl::StatusOr<Eigen::VectorXf> band = answer.session->FindMaterialBand(
         answer.model, *ranges_, answer.poses, answer.deformation.positions, cancellation);
-    if (cancellation.requested() || absl::IsNotFound(band.status())) return band.status();
-    TF_RETURN_IF_ERROR(answer.session->CheckHeld());
-    if (band.ok()) {
-      response_.set_uncertainty_p95_mm(
-          FloatBytes(choice_.all ? *band : Eigen::VectorXf((*band)(choice_.vertices))));
-    } else {
+    if (absl::IsFailedPrecondition(band.status()) || absl::IsResourceExhausted(band.status())) {
       response_.set_no_uncertainty(std::string(band.status().message()));
+      return answer.session->CheckHeld();
     }
-    return absl::OkStatus();
+    TF_RETURN_IF_ERROR(band.status());
+    response_.set_uncertainty_p95_mm(
+        FloatBytes(choice_.all ? *band : Eigen::VectorXf((*band)(choice_.vertices))));
+    return answer.session->CheckHeld();
   }
 
   void End(const absl::Status& outcome) { Finish(scope_.End(outcome)); }

@@ -1,6 +1,7 @@
 // Copyright 2026 The Tissueform Authors.
 // SPDX-License-Identifier: AGPL-3.0-or-later
 
+import { toCallError } from "../calls/call_error";
 import { type Gateway, sessionMetadata } from "../calls/gateway";
 import type { CaseFile } from "../case/case_file";
 import type { DeformOnceResponse } from "../generated/tissueform/v1/deform_service_pb";
@@ -34,7 +35,10 @@ export async function findBand(gateway: Gateway, ask: () => BandQuestion, signal
   const names = file.manifest.handles.map(({ name }) => name);
   const vertices = { selection: { case: "list" as const, value: { vertices: Array.from(file.followed) } } };
   const request = { session, model, poses: toMessages(names, poses), vertices, ranges: file.materialRanges ?? undefined };
-  return readBand(await gateway.deform.deformOnce(request, { headers: sessionMetadata(session), timeoutMs: DEADLINE_MS, signal }), file.followed.length);
+  const answer = await gateway.deform.deformOnce(request, { headers: sessionMetadata(session), timeoutMs: DEADLINE_MS, signal }).catch((thrown: unknown) => {
+    throw toCallError(thrown);
+  });
+  return readBand(answer, file.followed.length);
 }
 
 function readBand({ uncertaintyP95Mm: bytes, noUncertainty: reason }: DeformOnceResponse, count: number): RestingBand {

@@ -20,8 +20,8 @@
 namespace tissueform {
 namespace {
 
-using ::testing::HasSubstr;
 using testing::Flat;
+using ::testing::HasSubstr;
 using testing::StatusIs;
 using testing::UncertainBar;
 
