@@ -6,7 +6,8 @@ import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { dicomSlice } from "../../client/web/tests/volume/dicom_writer";
 import { timeInPage } from "./ct_input";
-import { type Hook, Planner, openCase, openPage } from "./planner";
+import { HEAD_RECIPE, goToStep, openNewPlan, writeHead } from "./new_plan";
+import { type Hook, Planner, live, moved, openCase, openPage, typeMove } from "./planner";
 
 // Figures of docs/planner.md: by hand, on a machine that does nothing else.
 //
@@ -76,6 +77,33 @@ test.each([["loopback", null], ["20 Mbit/s", SLOW]] as const)("first picture ove
   await page.waitForFunction(() => ((globalThis as unknown as Hook).tissueform?.view?.stage.drawnCount ?? 0) > 0);
   console.log(name, await page.evaluate(() => `${Math.round(performance.now())} ms to the first picture`));
 });
+
+test("from a CT that is dropped to a face that follows", async () => {
+  const folder = process.env.TISSUEFORM_CT;
+  const recipe = folder === undefined ? HEAD_RECIPE : { format: "tissueform-recipe", version: 7, lips: { part: true }, model: "linear_elastic", segments: HEAD_RECIPE.segments };
+  const { page } = await openNewPlan(await planner.browse(), planner.url);
+  const begin = performance.now();
+  const seconds = () => Math.round(performance.now() - begin) / 1000;
+  await page.getByLabel(folder === undefined ? "Choose files" : "Choose a folder").setInputFiles(folder ?? writeHead(planner.folder));
+  await page.locator(".plan-views").waitFor({ timeout: 120_000 });
+  const readS = seconds();
+  await page.evaluate((wanted) => (globalThis as any).tissueform.draft.change(wanted), recipe);
+  await goToStep(page, "Build");
+  await page.getByRole("button", { name: "Build the plan" }).click();
+  const open = page.getByRole("button", { name: "Open the planner" });
+  await open.waitFor({ timeout: 240_000 });
+  const builtS = seconds();
+  const read = page.getByLabel("I have read this");
+  if (await open.isDisabled()) {
+    await page.getByText(/^\d+ cautions?$/).click();
+    await read.check();
+  }
+  await open.click();
+  await live(page);
+  await typeMove(page, "Forward", "8");
+  await moved(page, 3, 12);
+  console.log(JSON.stringify({ ct: folder === undefined ? "bundled head" : "TISSUEFORM_CT", readS, builtS, followsS: seconds() }));
+}, 400_000);
 
 test("a cut that is dragged, from its move to the colored pieces", async () => {
   const ct = process.env.TISSUEFORM_CT;
