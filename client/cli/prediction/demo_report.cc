@@ -58,7 +58,7 @@ void PrintDifferenceInWords(const DemoPrediction& prediction) {
   const bool is_face = prediction.differences.size() > 1;
   const DistanceSummary& skin = prediction.differences[is_face ? 1 : 0].distances;
   absl::PrintF(
-      "  Two different models agree within %.1f mm on 95 %% of the "
+      "  Two different models agree within %.2f mm on 95 %% of the "
       "%s.\n",
       skin.p95_mm, is_face ? "face" : "skin");
   if (!is_face) return;
