@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from ._channel import PathLike
 from .client import Client
-from .errors import InvalidInput, NotFound
+from .errors import InvalidInput, NotFound, TissueformError
 from .meshes import Points, Tets, check_points, check_tets
 from .poses import Pose
 from .predictions import MaterialRanges
@@ -69,7 +69,9 @@ def read_plan(path: PathLike) -> Plan:
     plan = _read_json(file)
     try:
         return _plan_of(plan, file)
-    except (KeyError, TypeError, AttributeError) as error:
+    except TissueformError:
+        raise
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         raise InvalidInput(f"{file.name} is not a plan: {error!r}", advice="`tissueform plan check` names the place") from error
 
 
@@ -201,9 +203,12 @@ def _ranges(plan: Any, cell_data: Arrays, tet_count: int) -> Optional[MaterialRa
     missing = [value for value in values if isinstance(factor, dict) and float(value) not in by_label]
     if missing:
         raise InvalidInput(f'the plan states no range for the label {missing[0]:g} of "{factor["by_cell_data"]}"')
-    factors = [by_label.get(float(value), factor) for value in values]
-    ratio = uncertainty.get("poisson_ratio_95")
-    return MaterialRanges(tissues=tissues, factors_95=factors, poisson_ratio=None if ratio is None else (ratio[0], ratio[1]))
+    factors = [by_label[float(value)] if by_label else float(factor) for value in values]
+    ranges = MaterialRanges(tissues=tissues, factors_95=factors)
+    if "poisson_ratio_95" not in uncertainty:
+        return ranges
+    lowest, highest = uncertainty["poisson_ratio_95"]
+    return dataclasses.replace(ranges, poisson_ratio=(lowest, highest))
 
 
 def _tissues(factor: Any, stiffness: Any, cell_data: Arrays, tet_count: int) -> npt.NDArray[Any]:

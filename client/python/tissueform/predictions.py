@@ -146,8 +146,10 @@ class Prepared:
 
 def ranges_to_proto(ranges: Optional[MaterialRanges]) -> Optional[deform_service_pb2.MaterialRanges]:
     """None: the material is known."""
-    if ranges is None:
+    if not ranges:
         return None
+    if not isinstance(ranges, MaterialRanges) or len(ranges.factors_95) == 0:
+        raise InvalidInput("ranges must be MaterialRanges with a factor for each tissue, 1 to 16 of them", advice="see help(tissueform.MaterialRanges)")
     tissues = np.asarray(ranges.tissues)
     if tissues.ndim != 1 or tissues.dtype.kind not in "iu" or not (0 <= tissues.min(initial=0) and tissues.max(initial=0) < len(ranges.factors_95)):
         raise InvalidInput(f"tissues have the shape {tissues.shape} and the type {tissues.dtype}: expected integers from 0 to "

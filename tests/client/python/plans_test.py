@@ -99,6 +99,10 @@ class ReadPlanTest(unittest.TestCase):
         self.plan["uncertainty"] = {"youngs_modulus_factor_95": {"by_cell_data": "label", "values": {"0": 1.8}}}
         with self.assertRaisesRegex(InvalidInput, 'no range for the label 1 of "label"'):
             self.read()
+        for wrong in ([1, 2], {"youngs_modulus_factor_95": "two"}, {"youngs_modulus_factor_95": 2, "poisson_ratio_95": [0.4]}):
+            self.plan["uncertainty"] = wrong
+            with self.subTest(wrong), self.assertRaisesRegex(InvalidInput, "is not a plan: .*`tissueform plan check` names the place"):
+                self.read()
 
     def test_bad_plans_are_refused_by_one_line(self):
         for change, kind, text in (({"mesh": "../bar.vtu"}, InvalidInput, "outside of the plan's folder"),

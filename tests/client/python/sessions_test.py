@@ -156,6 +156,9 @@ class PreparedAnswersTest(unittest.TestCase):
             wrong = tissueform.MaterialRanges(tissues, factors_95=[1.8])
             with self.assertRaisesRegex(tissueform.InvalidInput, "from 0 to 0 for each tet"):
                 session.drag(prepared=tissueform.Prepared(ranges=wrong))
+            for nothing in ({"factors_95": [1.8]}, tissueform.MaterialRanges([], [])):
+                with self.assertRaisesRegex(tissueform.InvalidInput, "must be MaterialRanges with a factor for each tissue"):
+                    session.predict(BEND, ranges=nothing)
 
     def test_poses_beyond_their_range_are_asked_of_the_server(self):
         far = {"end": Pose(rotation_vector=(0, 0, 2))}

@@ -19,7 +19,7 @@ export interface PixelReader {
 }
 
 /** Here and now. A file of many frames is kept for the next of them. */
-export class FileReader implements PixelReader {
+export class LocalReader implements PixelReader {
   private held: { fileNumber: number; pixels: FilePixels } | null = null;
 
   async read(slices: readonly DicomHeader[]): Promise<Int16Array<ArrayBuffer>[]> {
@@ -59,10 +59,10 @@ class WorkerReader implements PixelReader {
 
 /** One for each processor where there is something to decode, otherwise one: bytes as they are come as fast as the disk gives them. */
 export function pixelReaders(slices: readonly DicomHeader[]): PixelReader[] {
-  if (typeof Worker === "undefined" || !slices.some(isCompressed)) return [new FileReader()];
+  if (typeof Worker === "undefined" || !slices.some(isCompressed)) return [new LocalReader()];
   const largest = slices.reduce((most, { file }) => Math.max(most, file.size), 1);
   const count = Math.min(navigator.hardwareConcurrency, MOST_WORKERS, Math.floor(MOST_HELD_BYTES / largest));
-  return count < 2 ? [new FileReader()] : Array.from({ length: count }, () => new WorkerReader());
+  return count < 2 ? [new LocalReader()] : Array.from({ length: count }, () => new WorkerReader());
 }
 
 /** In parts of some slices each, those of one file one after the other. */

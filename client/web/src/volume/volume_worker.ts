@@ -3,7 +3,7 @@
 
 import { openCtHere } from "./ct_input";
 import type { FromVolumeWorker, OpenedCt, ToVolumeWorker } from "./opened_ct";
-import { FileReader } from "./pixel_readers";
+import { LocalReader } from "./pixel_readers";
 import { readLabels } from "./volume_file";
 
 const scope = globalThis as unknown as {
@@ -11,7 +11,7 @@ const scope = globalThis as unknown as {
   postMessage(message: FromVolumeWorker, transfer?: Transferable[]): void;
 };
 let opened: OpenedCt | null = null;
-const pixels = new FileReader();
+const pixels = new LocalReader();
 let running = new AbortController();
 
 /** A file of a thousand need not send a thousand messages. */
